@@ -1,0 +1,43 @@
+#pragma once
+
+#include <string>
+
+#include "acquisition/frame/frame.h"
+
+namespace darkbox {
+
+/// What is asked of a camera before a capture.
+struct CameraConfig {
+    Seconds exposure{0.02};
+    double gain = 1.0;
+};
+
+/// What is really in effect after configure().
+struct CameraInfo {
+    std::string model;
+    std::string id;  ///< stable over replugging
+    int width = 0;   ///< pixels
+    int height = 0;
+    PixelFormat format = PixelFormat::grey16;
+    int bit_depth = 16;
+    double black_level = 0.0;  ///< sample units
+    Seconds frame_period{1.0 / 30};
+    int queue_depth = 1;     ///< buffers that may hold stale frames
+    int latency_frames = 0;  ///< exposures that pass before new controls take effect
+    FrameControls controls;
+};
+
+/// A source of frames. States: closed -configure-> ready -start-> streaming -stop-> ready; any other call is a
+/// std::logic_error. Thread-compatible: one thread drives it.
+class Camera {
+public:
+    virtual ~Camera() = default;
+    virtual CameraInfo configure(const CameraConfig& config) = 0;
+    virtual void start() = 0;
+    /// The oldest finished frame; waits for one. Throws DeadlineError at `deadline`, DeviceError when the camera fails.
+    virtual Frame next_frame(TimePoint deadline) = 0;
+    /// Safe in any state.
+    virtual void stop() = 0;
+};
+
+}  // namespace darkbox

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "acquisition/frame/ids.h"
+
+namespace darkbox {
+
+enum class FrameKind { lit, dark, ambient, flat, ball };
+
+/// How samples map to radiance.
+enum class TransferCurve { linear, srgb };
+
+/// One frame as the manifest (session.json) describes it. Times are nanoseconds on the capture's clock; imported
+/// pictures have none.
+struct FrameRecord {
+    std::string file;  ///< under data/, for example "frames/0003_lamp-04.tif"
+    FrameKind kind = FrameKind::lit;
+    std::string format;  ///< PixelFormat name for captured frames; "png", "tiff", "jpeg", "exr" for imported bytes
+    int width = 0;       ///< pixels
+    int height = 0;
+    int bit_depth = 16;        ///< significant bits; 32 for float
+    double black_level = 0.0;  ///< sample units
+    TransferCurve transfer = TransferCurve::linear;
+    std::optional<LampId> lamp;  ///< none for dark and ambient frames
+    std::string lamp_name;       ///< or the imported picture's own basename
+    double exposure_s = 0.0;
+    double gain = 1.0;
+    std::uint64_t sequence = 0;
+    std::int64_t timestamp_ns = 0;
+    std::int64_t lamp_on_ns = 0;
+    std::int64_t lamp_off_ns = 0;
+    bool verified = false;
+    std::string verification;  ///< what was checked and found, in words
+    std::string sha256;        ///< of the file, lower-case hex; filled by SessionWriter
+};
+
+/// Something worth knowing that happened during a capture.
+struct SessionEvent {
+    std::string when;  ///< ISO 8601, UTC
+    std::string what;
+};
+
+/// What holds for a whole session.
+struct SessionInfo {
+    int schema_version = 1;
+    std::string object;              ///< name given by the user
+    std::string created;             ///< ISO 8601, UTC
+    std::string source;              ///< "capture" or "import"
+    std::string rig;                 ///< the rig's name, empty for imports
+    std::string camera;              ///< model and id
+    int planned_shots = 0;           ///< frames the session needs to be complete
+    std::vector<std::string> notes;  ///< choices made on the way in, such as the transfer curve, in words
+};
+
+/// A sealed session, read only. Thread-compatible; const members are thread-safe.
+class Session {
+public:
+    /// Throws InputError when the folder is not a sealed session of a known schema (an unsealed one is told apart, with
+    /// the command that resumes it).
+    static Session open(const std::filesystem::path& folder);
+
+    const std::filesystem::path& folder() const { return folder_; }
+    const SessionInfo& info() const { return info_; }
+    const std::vector<FrameRecord>& frames() const { return frames_; }
+    const std::vector<SessionEvent>& events() const { return events_; }
+
+    std::filesystem::path path_of(const FrameRecord& frame) const;
+    /// Masks and given light files ("masks/mask.png", "given/lights.lp"), relative to data/, sorted.
+    const std::vector<std::string>& extras() const { return extras_; }
+    std::filesystem::path path_of_extra(const std::string& extra) const;
+
+    /// Checks every payload and tag checksum and that every file is there and listed.
+    /// Throws InputError that names the first bad file and how many are bad.
+    void verify() const;
+
+private:
+    std::filesystem::path folder_;
+    SessionInfo info_;
+    std::vector<FrameRecord> frames_;
+    std::vector<SessionEvent> events_;
+    std::vector<std::string> extras_;
+};
+
+}  // namespace darkbox

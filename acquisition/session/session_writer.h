@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "acquisition/frame/frame.h"
+#include "acquisition/session/session.h"
+
+namespace darkbox {
+
+/// Writes a session: append-only, atomic, resumable. A frame is acknowledged when add() returns: its file is flushed
+/// and renamed into place and its journal line is flushed, so it survives SIGKILL and power loss.
+/// One writer at a time holds a session (a lock file). Thread-compatible.
+class SessionWriter {
+public:
+    /// Starts a new session in an empty or absent folder. Throws InputError when the folder holds something else,
+    /// DeviceError when it cannot be written.
+    static SessionWriter create(const std::filesystem::path& folder, const SessionInfo& info);
+
+    /// Goes on with an interrupted session from its journal; half-written files are removed.
+    /// Throws InputError when there is none, when it is sealed already, or when the journal does not fit the files.
+    static SessionWriter resume(const std::filesystem::path& folder);
+
+    SessionWriter(SessionWriter&&) noexcept;
+    SessionWriter& operator=(SessionWriter&&) noexcept;
+    ~SessionWriter();
+
+    const std::filesystem::path& folder() const;
+    const SessionInfo& info() const;
+    /// In the order in which they were acknowledged.
+    const std::vector<FrameRecord>& acknowledged() const;
+
+    /// A frame off the sensor, kept without loss: as TIFF. `record.file`, sizes, format and sha256 are filled in here
+    /// from the frame; kind, lamp, times and verification are the caller's.
+    void add(const Frame& frame, FrameRecord record);
+    /// A picture kept as its bytes; `record.file` names it ("frames/cat.00.png").
+    void add(std::span<const std::byte> bytes, FrameRecord record);
+    /// Any other payload: masks, given lights, rig.toml. `name` is relative to data/, without "..".
+    void add_extra(const std::string& name, std::span<const std::byte> bytes);
+    void note_event(const std::string& what);
+    void add_note(const std::string& note);
+
+    /// Writes session.json and the BagIt manifests, flushes, removes the journal. The session is read-only afterwards.
+    /// Throws InputError when fewer frames are there than planned.
+    Session seal();
+
+private:
+    struct State;
+    explicit SessionWriter(std::unique_ptr<State> state);
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace darkbox

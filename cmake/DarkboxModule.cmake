@@ -1,0 +1,36 @@
+# One folder, one module, one target: darkbox_module(camera SOURCES ... PUBLIC ... PRIVATE ...) makes darkbox::camera.
+# Without SOURCES the module is header-only.
+
+add_library(darkbox_options INTERFACE)
+target_include_directories(darkbox_options INTERFACE ${PROJECT_SOURCE_DIR})
+target_compile_options(darkbox_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+  -Wconversion -Wno-sign-conversion -Wno-float-conversion -ffp-contract=off
+  $<$<BOOL:${DARKBOX_WARNINGS_AS_ERRORS}>:-Werror>)
+
+find_program(CCACHE ccache)
+if(CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+endif()
+
+function(darkbox_module name)
+  cmake_parse_arguments(M "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  if(M_SOURCES)
+    add_library(darkbox_${name} STATIC ${M_SOURCES})
+    target_link_libraries(darkbox_${name} PUBLIC ${M_PUBLIC} PRIVATE darkbox_options ${M_PRIVATE})
+    target_include_directories(darkbox_${name} PUBLIC ${PROJECT_SOURCE_DIR})
+  else()
+    add_library(darkbox_${name} INTERFACE)
+    target_link_libraries(darkbox_${name} INTERFACE ${M_PUBLIC})
+    target_include_directories(darkbox_${name} INTERFACE ${PROJECT_SOURCE_DIR})
+  endif()
+  add_library(darkbox::${name} ALIAS darkbox_${name})
+endfunction()
+
+# darkbox_test(calibration_test SOURCES ... LINK ...): one test program; exit status 77 means every test skipped.
+function(darkbox_test name)
+  cmake_parse_arguments(T "" "" "SOURCES;LINK" ${ARGN})
+  add_executable(${name} ${T_SOURCES})
+  target_link_libraries(${name} PRIVATE darkbox_options darkbox_test_main ${T_LINK})
+  add_test(NAME ${name} COMMAND ${name})
+  set_tests_properties(${name} PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600)
+endfunction()

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "acquisition/frame/units.h"
+
+namespace darkbox {
+
+/// One lamp of the rig as rig.toml describes it. Its LampId is its place in RigDescription::lamps.
+struct LampDescription {
+    std::string name;                     ///< unique
+    int channel = -1;                     ///< driver "usb" and "sim"
+    std::string line;                     ///< driver "gpio": name or offset
+    std::array<double, 3> position_mm{};  ///< rig frame: x right, y up, z to the camera, origin at the object
+    Seconds max_on{2.0};                  ///< longest continuous on-time
+    Seconds settle{0.005};                ///< from switch to steady light
+};
+
+struct CameraDescription {
+    std::string driver = "sim";  ///< "v4l2" or "sim"
+    std::string device;          ///< v4l2: stable id or path
+    Seconds exposure{0.02};
+    double gain = 1.0;
+    std::optional<double> mm_per_pixel;  ///< [camera.intrinsics], at the object
+};
+
+struct CaptureDescription {
+    Seconds frame_deadline{5.0};  ///< the longest wait for one frame
+    int tries = 3;                ///< per shot, before the session fails
+    double min_signal = 0.002;    ///< a lit frame's mean must exceed the dark frame's by this share of full scale
+};
+
+/// Options of the simulated rig; see sim/ for the scenes.
+struct SimDescription {
+    std::string scene = "brick-torus";
+    int width = 320;   ///< pixels
+    int height = 240;  ///< pixels
+    int bit_depth = 12;
+    double full_well_e = 20000;  ///< electrons at full scale
+    double read_noise_e = 5;     ///< electrons, standard deviation
+    int latency_frames = 1;
+    int queue_depth = 2;
+    std::uint64_t seed = 1;
+    bool real_time = false;  ///< virtual time otherwise
+};
+
+/// A rig.toml, parsed and valid. Plain data.
+struct RigDescription {
+    std::string name;
+    CameraDescription camera;
+    std::string lamps_driver = "sim";  ///< "gpio", "usb" or "sim"
+    std::vector<LampDescription> lamps;
+    std::optional<double> ball_diameter_mm;
+    CaptureDescription capture;
+    SimDescription sim;
+    std::filesystem::path sessions_folder;  ///< [api] sessions; empty = the caller's default
+    std::filesystem::path socket;           ///< [api] socket; empty = the caller's default
+    std::string toml;                       ///< the text it came from, byte for byte
+};
+
+/// Strict: an unknown key or a wrong type is an InputError that names the line and the nearest known key; a value out
+/// of range names the field, the value and the allowed range. `origin` names the file in messages.
+RigDescription parse_rig(const std::string& toml, const std::string& origin);
+RigDescription load_rig(const std::filesystem::path& file);
+
+/// The built-in simulated rig with this many lamps on a dome; `./run demo` uses 12. Round-trips through parse_rig().
+std::string simulated_rig_toml(int lamps);
+
+}  // namespace darkbox

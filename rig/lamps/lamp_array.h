@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "acquisition/frame/ids.h"
+#include "acquisition/frame/units.h"
+
+namespace darkbox {
+
+struct LampHealth {
+    bool reachable = true;
+    std::vector<std::string> problems;  ///< sentences for people; empty when all is well
+};
+
+/// The lamps of a rig; at most one is lit. Every implementation is dark before its constructor returns and after its
+/// destructor ran, whatever happened between. Thread-compatible: one thread drives it.
+class LampArray {
+public:
+    virtual ~LampArray() = default;
+    virtual std::size_t size() const = 0;
+    /// Lights this lamp alone, the others dark. `level` in (0, 1]. Throws DeviceError.
+    virtual void light(LampId lamp, double level) = 0;
+    /// All lamps dark. Throws DeviceError when that cannot be confirmed.
+    virtual void dark() = 0;
+    virtual LampHealth health() = 0;
+};
+
+/// Darkens the lamps on every way out of a scope. The destructor swallows the error: by then one is already under way.
+class DarkOnExit {
+public:
+    explicit DarkOnExit(LampArray& lamps) : lamps_(lamps) {}
+    DarkOnExit(const DarkOnExit&) = delete;
+    DarkOnExit& operator=(const DarkOnExit&) = delete;
+    ~DarkOnExit() {
+        try {
+            lamps_.dark();
+        } catch (...) {  // NOLINT(bugprone-empty-catch)
+        }
+    }
+
+private:
+    LampArray& lamps_;
+};
+
+}  // namespace darkbox
