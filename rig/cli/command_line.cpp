@@ -1,0 +1,96 @@
+#include "rig/cli/command_line.h"
+
+#include <fmt/color.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdio>
+
+#include "acquisition/frame/error.h"
+#include "rig/cli/interrupt.h"
+#include "rig/cli/progress_bar.h"
+
+namespace darkbox {
+namespace {
+
+void print_error(const std::string& what, const std::string& hint) {
+    const bool colour = ::isatty(STDERR_FILENO) != 0;
+    const auto style = colour ? fmt::fg(fmt::terminal_color::red) | fmt::emphasis::bold : fmt::text_style();
+    fmt::print(stderr, "{} {}\n", fmt::format(style, "error:"), what);
+    if (!hint.empty()) fmt::print(stderr, "  {}\n", hint);
+}
+
+void print_warning(const std::string& warning) {
+    const bool colour = ::isatty(STDERR_FILENO) != 0;
+    const auto style = colour ? fmt::text_style(fmt::fg(fmt::terminal_color::yellow)) : fmt::text_style();
+    fmt::print(stderr, "{} {}\n", fmt::format(style, "warning:"), warning);
+}
+
+}  // namespace
+
+CommandLine::CommandLine() : app_("Photometric capture and relighting", "darkbox") {
+    app_.set_version_flag("--version", std::string("darkbox ") + DARKBOX_VERSION);
+    app_.require_subcommand(1);
+    app_.footer(
+        "Every command has --help with an example.\n"
+        "Exit status: 0 done, 1 failed, 2 wrong usage, 3 finished with warnings under --strict.");
+}
+
+CLI::App& CommandLine::add(const std::string& name, const std::string& description, const std::string& example,
+                           Body body, CLI::App* parent) {
+    CLI::App& command = *(parent != nullptr ? parent : &app_)->add_subcommand(name, description);
+    command.add_flag("--json", json_, "Print one JSON object on stdout");
+    command.add_flag("--strict", strict_, "Exit with status 3 when there were warnings");
+    command.add_option("--threads", threads_, "Threads to use; 0 = all cores")->check(CLI::Range(0, 1024));
+    command.footer("Example:\n  " + example);
+    command.callback([this, body = std::move(body)] { chosen_ = body; });
+    return command;
+}
+
+CLI::App& CommandLine::add_group(const std::string& name, const std::string& description) {
+    CLI::App& group = *app_.add_subcommand(name, description);
+    group.require_subcommand(1);
+    return group;
+}
+
+int CommandLine::run(int argc, char** argv) {
+    try {
+        return parse_and_run(argc, argv);
+    } catch (const Error& error) {
+        print_error(error.what(), error.hint());
+    } catch (const std::bad_alloc&) {
+        print_error("out of memory", "close other programs, or work on smaller pictures");
+    } catch (const std::exception& error) {
+        print_error(fmt::format("unexpected: {}", error.what()), "this is a defect of darkbox; please report it");
+    }
+    return exit_failed;
+}
+
+int CommandLine::parse_and_run(int argc, char** argv) {
+    Interrupt interrupt;  // before anything starts a thread, so that all of them leave SIGINT and SIGTERM to it
+    try {
+        app_.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        return app_.exit(error) == 0 ? exit_done : exit_usage;
+    }
+    ProgressBar bar;
+    WorkContext work;
+    work.report = [&bar](const ProgressUpdate& update) { bar.show(update); };
+    work.stop = interrupt.token();
+    work.threads = threads_;
+
+    const CommandResult result = (*chosen_)(work);
+    bar.finish();
+    for (const std::string& warning : result.warnings) print_warning(warning);
+    if (json_) {
+        Json json = result.json;
+        if (!json.contains("warnings")) json["warnings"] = result.warnings;
+        fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
+    } else if (!result.text.empty()) {
+        fmt::print("{}\n", result.text);
+    }
+    if (std::fflush(stdout) != 0) throw Error("the result could not be written to stdout", "is the disk full?");
+    return strict_ && !result.warnings.empty() ? exit_warnings : exit_done;
+}
+
+}  // namespace darkbox
