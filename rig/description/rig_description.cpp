@@ -1,0 +1,242 @@
+#include "rig/description/rig_description.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+
+#include "acquisition/frame/error.h"
+#include "rig/description/toml_section.h"
+
+namespace darkbox {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t largest_file = 1 << 20;  ///< bytes; 64 lamps need about 6000
+constexpr std::size_t most_lamps = 64;
+constexpr std::size_t longest_name = 64;
+constexpr double nearest_lamp_mm = 10;
+constexpr double farthest_lamp_mm = 100'000;
+
+Seconds milliseconds(double ms) { return Seconds(ms / 1000.0); }
+double as_milliseconds(Seconds s) { return s.count() * 1000.0; }
+
+bool is_file_name_character(char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' ||
+           c == '.';
+}
+
+/// Lamp names become part of file names.
+bool is_lamp_name(const std::string& name) {
+    return !name.empty() && name.size() <= longest_name && name.front() != '.' &&
+           std::all_of(name.begin(), name.end(), is_file_name_character);
+}
+
+std::array<double, 3> read_position(TomlSection& section) {
+    const auto read = section.numbers("position_mm", 3);
+    if (!read)
+        section.fail("position_mm", "position_mm is missing",
+                     "add position_mm = [x, y, z]: x right, y up, z to the camera, from the object");
+    const std::array<double, 3> position{(*read)[0], (*read)[1], (*read)[2]};
+    const double distance = std::hypot(position[0], position[1], position[2]);
+    if (distance < nearest_lamp_mm || distance > farthest_lamp_mm)
+        section.fail("position_mm",
+                     fmt::format("position_mm is {} mm from the object; allowed: {} to {}", distance, nearest_lamp_mm,
+                                 farthest_lamp_mm),
+                     "give the position in millimetres, measured from the object");
+    return position;
+}
+
+std::string read_lamp_name(TomlSection& section) {
+    std::string name = section.required_text("name");
+    if (!is_lamp_name(name))
+        section.fail("name", fmt::format("name '{}' cannot be part of a file name", name.substr(0, longest_name)),
+                     fmt::format("use 1 to {} letters, digits, '-', '_' or '.', not starting with '.'", longest_name));
+    return name;
+}
+
+/// Which output of the driver the lamp hangs on: a GPIO line, or a channel of the others.
+void read_output(TomlSection& section, const std::string& driver, LampDescription& lamp) {
+    const auto line = section.text_or_digits("line");
+    const auto channel = section.integer("channel", {0, static_cast<std::int64_t>(most_lamps) - 1});
+    const std::string wanted = driver == "gpio" ? "line" : "channel";
+    const std::string other = driver == "gpio" ? "channel" : "line";
+    if (section.has(other))
+        section.fail(other, fmt::format("{} does not belong to driver \"{}\"", other, driver),
+                     fmt::format("name the lamp's output with {}", wanted));
+    if (!section.has(wanted) || (line && line->empty()))
+        section.fail(wanted, fmt::format("{} is missing; driver \"{}\" needs it", wanted, driver),
+                     fmt::format("add {} to the lamp", wanted));
+    lamp.line = line.value_or("");
+    lamp.channel = channel ? static_cast<int>(*channel) : -1;
+}
+
+LampDescription read_lamp(TomlSection& section, const std::string& driver, Seconds exposure) {
+    LampDescription lamp;
+    section.allow({"name", "line", "channel", "position_mm", "max_on_s", "settle_ms"});
+    lamp.name = read_lamp_name(section);
+    read_output(section, driver, lamp);
+    lamp.position_mm = read_position(section);
+    lamp.max_on = Seconds(section.number("max_on_s", {0.001, 600}).value_or(lamp.max_on.count()));
+    lamp.settle = milliseconds(section.number("settle_ms", {0, 10'000}).value_or(as_milliseconds(lamp.settle)));
+    if (lamp.max_on <= lamp.settle + exposure)
+        section.fail("max_on_s",
+                     fmt::format("max_on_s is {}; allowed: more than settle_ms and exposure_ms together ({} ms)",
+                                 lamp.max_on.count(), as_milliseconds(lamp.settle + exposure)),
+                     "raise max_on_s, or shorten exposure_ms of [camera]");
+    return lamp;
+}
+
+/// `output` is what two lamps may not share, such as their name.
+template <typename Output>
+void refuse_duplicate(const std::vector<LampDescription>& lamps, Output output, const TomlSection& section,
+                      const std::string& key) {
+    const auto same = [&](const LampDescription& lamp) { return output(lamp) == output(lamps.back()); };
+    const auto earlier = std::find_if(lamps.begin(), lamps.end() - 1, same);
+    if (earlier == lamps.end() - 1) return;
+    section.fail(key,
+                 fmt::format("{} '{}' of lamp '{}' is taken by lamp {} ('{}')", key, output(lamps.back()),
+                             lamps.back().name, earlier - lamps.begin() + 1, earlier->name),
+                 fmt::format("give every lamp a {} of its own", key));
+}
+
+void read_lamps(TomlSection& section, RigDescription& rig) {
+    section.allow({"driver", "lamp"});
+    rig.lamps_driver = section.choice("driver", rig.lamps_driver, {"gpio", "usb", "sim"});
+    std::vector<TomlSection> lamps = section.sections("lamp", "[[lamps.lamp]]");
+    if (lamps.empty()) section.fail("lamp", "holds no lamp; allowed: 1 to 64", "add a [[lamps.lamp]] for each lamp");
+    for (TomlSection& lamp : lamps) {
+        if (rig.lamps.size() == most_lamps)
+            lamp.fail("name", fmt::format("is one of {} lamps; allowed: 1 to {}", lamps.size(), most_lamps),
+                      "describe at most 64 lamps");
+        rig.lamps.push_back(read_lamp(lamp, rig.lamps_driver, rig.camera.exposure));
+        refuse_duplicate(rig.lamps, [](const LampDescription& l) { return l.name; }, lamp, "name");
+        if (rig.lamps_driver == "gpio")
+            refuse_duplicate(rig.lamps, [](const LampDescription& l) { return l.line; }, lamp, "line");
+        else
+            refuse_duplicate(rig.lamps, [](const LampDescription& l) { return l.channel; }, lamp, "channel");
+    }
+}
+
+CameraDescription read_camera(TomlSection& section) {
+    CameraDescription camera;
+    section.allow({"driver", "device", "exposure_ms", "gain", "intrinsics"});
+    camera.driver = section.choice("driver", camera.driver, {"v4l2", "sim"});
+    camera.device = section.text("device").value_or("");
+    camera.exposure =
+        milliseconds(section.number("exposure_ms", {0.001, 60'000}).value_or(as_milliseconds(camera.exposure)));
+    camera.gain = section.number("gain", {0.001, 1000}).value_or(camera.gain);
+    if (auto intrinsics = section.section("intrinsics", "[camera.intrinsics]")) {
+        intrinsics->allow({"mm_per_pixel"});
+        camera.mm_per_pixel = intrinsics->number("mm_per_pixel", {0.0001, 100});
+    }
+    if (camera.driver == "v4l2" && camera.device.empty())
+        section.fail("device", "device is missing; driver \"v4l2\" needs it",
+                     "add device = \"/dev/v4l/by-id/...\" (ls /dev/v4l/by-id)");
+    return camera;
+}
+
+CaptureDescription read_capture(TomlSection& section) {
+    CaptureDescription capture;
+    section.allow({"frame_deadline_s", "tries", "min_signal"});
+    capture.frame_deadline =
+        Seconds(section.number("frame_deadline_s", {0.01, 600}).value_or(capture.frame_deadline.count()));
+    capture.tries = static_cast<int>(section.integer("tries", {1, 100}).value_or(capture.tries));
+    capture.min_signal = section.number("min_signal", {0.0001, 0.5}).value_or(capture.min_signal);
+    return capture;
+}
+
+SimDescription read_sim(TomlSection& section) {
+    SimDescription sim;
+    section.allow({"scene", "width", "height", "bit_depth", "full_well_e", "read_noise_e", "latency_frames",
+                   "queue_depth", "seed", "real_time"});
+    const auto whole = [&](const char* key, Allowed<std::int64_t> allowed, int fallback) {
+        return static_cast<int>(section.integer(key, allowed).value_or(fallback));
+    };
+    if (section.has("scene")) sim.scene = section.required_text("scene");
+    sim.width = whole("width", {16, 8192}, sim.width);
+    sim.height = whole("height", {16, 8192}, sim.height);
+    sim.bit_depth = whole("bit_depth", {8, 16}, sim.bit_depth);
+    sim.full_well_e = section.number("full_well_e", {100, 10'000'000}).value_or(sim.full_well_e);
+    sim.read_noise_e = section.number("read_noise_e", {0, 1000}).value_or(sim.read_noise_e);
+    sim.latency_frames = whole("latency_frames", {0, 16}, sim.latency_frames);
+    sim.queue_depth = whole("queue_depth", {1, 32}, sim.queue_depth);
+    const auto any_seed = Allowed<std::int64_t>{0, std::numeric_limits<std::int64_t>::max()};
+    sim.seed =
+        static_cast<std::uint64_t>(section.integer("seed", any_seed).value_or(static_cast<std::int64_t>(sim.seed)));
+    sim.real_time = section.flag("real_time").value_or(sim.real_time);
+    return sim;
+}
+
+void read_api(TomlSection& section, RigDescription& rig) {
+    section.allow({"sessions", "socket"});
+    rig.sessions_folder = section.text("sessions").value_or("");
+    rig.socket = section.text("socket").value_or("");
+}
+
+RigDescription read_rig(TomlSection& root) {
+    root.allow({"rig", "camera", "lamps", "ball", "capture", "processing", "api", "sim"}, "section");
+    RigDescription rig;
+    if (auto section = root.section("rig", "[rig]")) {
+        section->allow({"name"});
+        rig.name = section->required_text("name");
+    } else {
+        root.fail("rig", "has no [rig]", "add [rig] with name = \"...\"");
+    }
+    if (auto section = root.section("camera", "[camera]")) rig.camera = read_camera(*section);
+    auto lamps = root.section("lamps", "[lamps]");
+    if (auto section = root.section("ball", "[ball]")) {
+        section->allow({"diameter_mm"});
+        rig.ball_diameter_mm = section->number("diameter_mm", {0.1, 10'000});
+    }
+    if (auto section = root.section("capture", "[capture]")) rig.capture = read_capture(*section);
+    if (auto section = root.section("processing", "[processing]")) section->allow({});
+    if (auto section = root.section("api", "[api]")) read_api(*section, rig);
+    if (auto section = root.section("sim", "[sim]")) rig.sim = read_sim(*section);
+    if (!lamps) root.fail("lamps", "has no [lamps]", "add [lamps] with a [[lamps.lamp]] for each lamp");
+    read_lamps(*lamps, rig);
+    if ((rig.camera.driver == "sim") != (rig.lamps_driver == "sim"))
+        root.fail("lamps", fmt::format("has a \"{}\" camera and \"{}\" lamps", rig.camera.driver, rig.lamps_driver),
+                  "a simulated camera sees simulated lamps only: make both \"sim\" or neither");
+    return rig;
+}
+
+void refuse_huge(std::uintmax_t size, const std::string& origin) {
+    if (size <= largest_file) return;
+    throw InputError(fmt::format("{}: the file has {} bytes; allowed: at most {}", origin, size, largest_file),
+                     "a rig.toml of 64 lamps has about 6000 bytes: check that this is the right file");
+}
+
+}  // namespace
+
+RigDescription parse_rig(const std::string& toml, const std::string& origin) {
+    refuse_huge(toml.size(), origin);
+    toml::table table;
+    try {
+        table = toml::parse(toml, origin);
+    } catch (const toml::parse_error& error) {
+        throw InputError(fmt::format("{}:{}: {}", origin, error.source().begin.line, error.description()),
+                         "correct that line; https://toml.io describes the format");
+    }
+    TomlSection root(table, "the rig's description", origin);
+    RigDescription rig = read_rig(root);
+    rig.toml = toml;
+    return rig;
+}
+
+RigDescription load_rig(const fs::path& file) {
+    std::error_code error;
+    if (!fs::is_regular_file(file, error))
+        throw InputError(fmt::format("{}: there is no such file", file.string()),
+                         "name a rig.toml, or start from one of the examples in rig/description/examples");
+    refuse_huge(fs::file_size(file, error), file.string());
+    std::ifstream in(file, std::ios::binary);
+    std::string text(std::istreambuf_iterator<char>(in), {});
+    if (!in) throw InputError(fmt::format("{}: the file cannot be read", file.string()), "check its permissions");
+    return parse_rig(text, file.string());
+}
+
+}  // namespace darkbox

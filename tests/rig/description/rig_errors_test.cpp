@@ -1,0 +1,191 @@
+#include <gmock/gmock.h>
+
+#include <ostream>
+#include <string>
+
+#include "acquisition/frame/error.h"
+#include "rig/description/rig_description.h"
+
+namespace darkbox {
+namespace {
+
+constexpr const char* good = R"([rig]
+name = "bench"
+[camera]
+driver = "sim"
+exposure_ms = 20
+[camera.intrinsics]
+mm_per_pixel = 0.5
+[capture]
+tries = 3
+[processing]
+[api]
+socket = "s"
+[sim]
+width = 320
+[lamps]
+driver = "sim"
+[[lamps.lamp]]
+name = "a"
+channel = 0
+position_mm = [0, 0, 900]
+[[lamps.lamp]]
+name = "b"
+channel = 1
+position_mm = [0, 500, 700]
+)";
+
+/// The good rig with one piece of its text replaced.
+std::string with(const std::string& piece, const std::string& other) {
+    std::string toml = good;
+    const std::size_t at = toml.find(piece);
+    EXPECT_NE(at, std::string::npos) << piece;
+    return toml.replace(at, piece.size(), other);
+}
+
+std::string error_of(const std::string& toml) {
+    try {
+        parse_rig(toml, "rig.toml");
+    } catch (const InputError& error) {
+        EXPECT_FALSE(error.hint().empty()) << error.what();
+        return error.what();
+    }
+    return "no error";
+}
+
+struct BadRig {
+    std::string label;
+    std::string toml;
+    std::string message;  ///< a part of what is said
+};
+
+void PrintTo(const BadRig& rig, std::ostream* out) { *out << rig.label; }
+
+class RigErrors : public testing::TestWithParam<BadRig> {};
+
+TEST_P(RigErrors, NamesLineFieldAndRemedy) {
+    EXPECT_THAT(error_of(GetParam().toml), testing::HasSubstr(GetParam().message));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Unknown, RigErrors,
+    testing::Values(BadRig{"key", with("exposure_ms = 20", "exposure_mss = 20"),
+                           "rig.toml:5: unknown key 'exposure_mss' in [camera]; did you mean 'exposure_ms'?"},
+                    BadRig{"lamp", with("channel = 1", "chanel = 1"),
+                           "rig.toml:23: unknown key 'chanel' in [[lamps.lamp]]; did you mean 'channel'?"},
+                    BadRig{"lamp2", with("channel = 1", "channel = 1\nsetle_ms = 1"),
+                           "rig.toml:24: unknown key 'setle_ms' in [[lamps.lamp]]; did you mean 'settle_ms'?"},
+                    BadRig{"section", with("[capture]", "[captrue]"), "rig.toml:8: unknown section 'captrue'"},
+                    BadRig{"suggestion", with("[capture]", "[captrue]"), "did you mean 'capture'?"},
+                    BadRig{"processing", with("[processing]", "[processing]\nsolver = \"lsq\""),
+                           "rig.toml:11: unknown key 'solver' in [processing]"},
+                    BadRig{"first", with("width = 320", "zidth = 1\nabc = 2"),
+                           "rig.toml:14: unknown key 'zidth' in [sim]"},
+                    BadRig{"intrinsics", with("mm_per_pixel = 0.5", "mm_per_px = 0.5"), "in [camera.intrinsics]"}));
+
+INSTANTIATE_TEST_SUITE_P(
+    WrongType, RigErrors,
+    testing::Values(
+        BadRig{"number", with("exposure_ms = 20", "exposure_ms = \"20\""),
+               "rig.toml:5: [camera] exposure_ms must be a number, but is text"},
+        BadRig{"whole", with("tries = 3", "tries = 3.5"), "rig.toml:9: [capture] tries must be a whole number"},
+        BadRig{"text", with("name = \"bench\"", "name = 7"), "rig.toml:2: [rig] name must be text"},
+        BadRig{"flag", with("width = 320", "real_time = 1"), "real_time must be true or false, but is a whole number"},
+        BadRig{"table", with("[capture]\ntries = 3", "[[capture]]\ntries = 3"), "capture must be a table"},
+        BadRig{"lamps",
+               with("[[lamps.lamp]]\nname = \"a\"\nchannel = 0\nposition_mm = [0, 0, 900]\n"
+                    "[[lamps.lamp]]\nname = \"b\"\nchannel = 1\nposition_mm = [0, 500, 700]\n",
+                    "lamp = [1, 2]\n"),
+               "lamp must be a list of tables"},
+        BadRig{"position", with("[0, 0, 900]", "[0, 900]"), "position_mm must be 3 numbers in brackets"},
+        BadRig{"element", with("[0, 0, 900]", "[0, \"0\", 900]"), "position_mm must be 3 numbers in brackets"},
+        BadRig{"date", with("exposure_ms = 20", "exposure_ms = 2020-01-01"), "but is a date or time"}));
+
+INSTANTIATE_TEST_SUITE_P(
+    OutOfRange, RigErrors,
+    testing::Values(BadRig{"exposure", with("exposure_ms = 20", "exposure_ms = 0"),
+                           "rig.toml:5: [camera] exposure_ms is 0; allowed: 0.001 to 60000"},
+                    BadRig{"nan", with("exposure_ms = 20", "exposure_ms = nan"), "exposure_ms is nan; allowed"},
+                    BadRig{"inf", with("mm_per_pixel = 0.5", "mm_per_pixel = inf"), "mm_per_pixel is inf; allowed"},
+                    BadRig{"tries", with("tries = 3", "tries = 0"), "[capture] tries is 0; allowed: 1 to 100"},
+                    BadRig{"huge", with("width = 320", "width = 9223372036854775807"), "allowed: 16 to 8192"},
+                    BadRig{"too_huge", with("width = 320", "width = 9223372036854775808"), "rig.toml:14:"},
+                    BadRig{"driver", with("driver = \"sim\"", "driver = \"usb\""), "allowed: \"v4l2\", \"sim\""},
+                    BadRig{"infinite", with("[0, 0, 900]", "[0, -inf, 900]"), "position_mm has the element -inf"},
+                    BadRig{"nan_position", with("[0, 0, 900]", "[nan, 0, 900]"), "position_mm has the element nan"},
+                    BadRig{"at_object", with("[0, 0, 900]", "[0, 0, 0]"),
+                           "rig.toml:20: [[lamps.lamp]] position_mm is 0 mm"},
+                    BadRig{"far", with("[0, 0, 900]", "[0, 0, 9e9]"), "allowed: 10 to 100000"},
+                    BadRig{"channel", with("channel = 1", "channel = 64"),
+                           "rig.toml:23: [[lamps.lamp]] channel is 64; allowed: 0 to 63"},
+                    BadRig{"seed", with("width = 320", "seed = -1"), "seed is -1; allowed: at least 0"},
+                    BadRig{"max_on", with("channel = 1", "channel = 1\nmax_on_s = 0.02"),
+                           "rig.toml:24: [[lamps.lamp]] max_on_s is 0.02; allowed: more than"},
+                    BadRig{"name", with("name = \"b\"", "name = \"../b\""), "cannot be part of a file name"}));
+
+INSTANTIATE_TEST_SUITE_P(
+    DoNotFit, RigErrors,
+    testing::Values(BadRig{"same_name", with("name = \"b\"", "name = \"a\""),
+                           "rig.toml:22: [[lamps.lamp]] name 'a' of lamp 'a' is taken by lamp 1 ('a')"},
+                    BadRig{"same_channel", with("channel = 1", "channel = 0"),
+                           "rig.toml:23: [[lamps.lamp]] channel '0' of lamp 'b' is taken by lamp 1 ('a')"},
+                    BadRig{"line", with("channel = 1", "channel = 1\nline = 4"),
+                           "line does not belong to driver \"sim\""},
+                    BadRig{"gpio", with("[lamps]\ndriver = \"sim\"", "[lamps]\ndriver = \"gpio\""),
+                           "channel does not belong to driver \"gpio\""},
+                    BadRig{"v4l2", with("driver = \"sim\"", "driver = \"v4l2\""), "device is missing"},
+                    BadRig{"mixed", with("driver = \"sim\"", "driver = \"v4l2\"\ndevice = \"/dev/video0\""),
+                           "has a \"v4l2\" camera and \"sim\" lamps"},
+                    BadRig{"duplicate_key", with("tries = 3", "tries = 3\ntries = 4"), "rig.toml:10:"},
+                    BadRig{"syntax", with("tries = 3", "tries ="), "rig.toml:9:"},
+                    BadRig{"no_channel", with("channel = 1\n", ""), "rig.toml:21: [[lamps.lamp]] channel is missing"},
+                    BadRig{"no_position", with("position_mm = [0, 0, 900]\n", ""),
+                           "rig.toml:17: [[lamps.lamp]] position_mm is missing"},
+                    BadRig{"no_rig", with("[rig]\nname = \"bench\"\n", ""), "has no [rig]"},
+                    BadRig{"no_name", with("name = \"bench\"\n", ""), "rig.toml:1: [rig] name is missing"},
+                    BadRig{"empty_name", with("name = \"bench\"", "name = \"\""), "name is empty"}));
+
+std::string lamps_toml(int count) {
+    std::string toml = "[rig]\nname = \"r\"\n[lamps]\n";
+    for (int i = 0; i < count; ++i)
+        toml += "[[lamps.lamp]]\nname = \"l" + std::to_string(i) + "\"\nchannel = " + std::to_string(i % 64) +
+                "\nposition_mm = [0, 0, 900]\n";
+    return toml;
+}
+
+TEST(RigLamps, ThereAreOneToSixtyFour) {
+    EXPECT_EQ(parse_rig(lamps_toml(1), "rig.toml").lamps.size(), 1);
+    EXPECT_EQ(parse_rig(lamps_toml(64), "rig.toml").lamps.size(), 64);
+    EXPECT_THAT(error_of(lamps_toml(0)), testing::HasSubstr("rig.toml:3: [lamps] holds no lamp; allowed: 1 to 64"));
+    EXPECT_THAT(error_of(lamps_toml(65)), testing::HasSubstr("rig.toml:261: [[lamps.lamp]] is one of 65 lamps"));
+    EXPECT_THAT(error_of("[rig]\nname = \"r\"\n"), testing::HasSubstr("has no [lamps]"));
+}
+
+TEST(RigText, HostileTextIsAnErrorInWords) {
+    EXPECT_NE(error_of(std::string(2 << 20, '\n')), "no error");
+    EXPECT_NE(error_of(std::string(5000, '[')), "no error") << "nesting";
+    EXPECT_NE(error_of("a = " + std::string(5000, '[')), "no error") << "nesting";
+    EXPECT_NE(error_of(std::string("[rig]\nname = \"\0\"", 16)), "no error") << "a NUL byte";
+    EXPECT_NE(error_of("\xff\xfe"), "no error") << "not UTF-8";
+    EXPECT_LT(error_of(with("tries = 3", std::string(100'000, 'k') + " = 3")).size(), 1000) << "an endless key";
+    EXPECT_NE(error_of(""), "no error");
+}
+
+TEST(RigText, EveryTruncationIsAnErrorOrARig) {
+    const std::string toml = good;
+    for (std::size_t size = 0; size < toml.size(); ++size) {
+        const std::string message = error_of(toml.substr(0, size));
+        if (message != "no error") {
+            EXPECT_THAT(message, testing::StartsWith("rig.toml:"));
+        }
+    }
+}
+
+TEST(RigText, WindowsLineEndingsAreRead) {
+    std::string toml = good;
+    for (std::size_t at = 0; (at = toml.find('\n', at)) != std::string::npos; at += 2) toml.replace(at, 1, "\r\n");
+    EXPECT_EQ(parse_rig(toml, "rig.toml").lamps.size(), 2);
+}
+
+}  // namespace
+}  // namespace darkbox
