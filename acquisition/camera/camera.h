@@ -27,8 +27,9 @@ struct CameraInfo {
     FrameControls controls;
 };
 
-/// A source of frames. States: closed -configure-> ready -start-> streaming -stop-> ready; any other call is a
-/// std::logic_error. Thread-compatible: one thread drives it.
+/// A source of frames. States: closed -configure-> ready -start-> streaming -stop-> ready; configure() is also good in
+/// ready, so that a second capture or another exposure needs no new camera. Any other call is a std::logic_error.
+/// Thread-compatible: one thread drives it.
 class Camera {
 public:
     virtual ~Camera() = default;
