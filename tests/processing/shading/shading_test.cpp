@@ -1,0 +1,167 @@
+#include "processing/shading/shading.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "acquisition/frame/error.h"
+#include "tests/support/textured_sphere.h"
+
+namespace darkbox {
+namespace {
+
+using test::textured_sphere;
+using test::TexturedSphere;
+
+ShadingResult shade(const TexturedSphere& s, const ShadingOptions& options = {}, const WorkContext& work = {}) {
+    return shading_maps(s.stack, s.lights, s.normals, s.albedo, s.index, options, work);
+}
+
+double largest_difference_to_lambert(const ShadingMaps& maps) {
+    double largest = 0;
+    for (int k = 0; k < maps.texels; ++k)
+        for (int level = 0; level < maps.levels; ++level) {
+            const double r = static_cast<double>(level) / (maps.levels - 1);
+            for (int c = 0; c < 3; ++c)
+                largest = std::max(largest, std::abs(maps.radiance(k, level)[c] - r * maps.mean_albedo(k, 0)[c]));
+        }
+    return largest;
+}
+
+void add_noise(PhotoStack& stack, double sigma) {
+    cv::RNG random(5);
+    for (cv::Mat3f& image : stack.images)
+        for (cv::Vec3f& pixel : image)
+            for (int c = 0; c < 3; ++c) pixel[c] += static_cast<float>(random.gaussian(sigma));
+}
+
+TEST(ShadingMaps, OfALambertSphereAreMeanAlbedoTimesR) {
+    const TexturedSphere sphere = textured_sphere(90);
+    const ShadingMaps maps = shade(sphere).maps;
+    EXPECT_EQ(maps.texels, 6);
+    EXPECT_EQ(maps.levels, 11);
+    EXPECT_LT(largest_difference_to_lambert(maps), 1e-6);
+    EXPECT_GT(maps.samples(2, 8), 100);
+}
+
+TEST(ShadingMaps, StateTheMeanAlbedo) {
+    const TexturedSphere sphere = textured_sphere(90);
+    const ShadingMaps maps = shade(sphere).maps;
+    for (int k = 1; k <= 6; ++k) {
+        const cv::Scalar mean = cv::mean(sphere.albedo.albedo, sphere.index.label == k);
+        for (int c = 0; c < 3; ++c) EXPECT_NEAR(maps.mean_albedo(k - 1, 0)[c], mean[c], 1e-6);
+    }
+}
+
+TEST(ShadingMaps, AverageNoiseOut) {
+    TexturedSphere sphere = textured_sphere(90);
+    add_noise(sphere.stack, 0.02);
+    EXPECT_LT(largest_difference_to_lambert(shade(sphere).maps), 0.005);
+}
+
+TEST(ShadingMaps, AreNotDraggedDownByCastShadows) {
+    TexturedSphere sphere = textured_sphere(90);
+    for (std::size_t i = 0; i < sphere.stack.images.size(); ++i)
+        sphere.stack.images[i](cv::Rect(static_cast<int>(7 * i), 0, 12, 90)) *= 0.05;
+    EXPECT_LT(largest_difference_to_lambert(shade(sphere).maps), 1e-6);
+}
+
+TEST(ShadingMaps, LeaveClippedSamplesOut) {
+    TexturedSphere sphere = textured_sphere(90);
+    for (std::size_t i = 0; i < sphere.stack.images.size(); ++i)
+        for (int y = 0; y < 90; ++y)
+            for (int x = 0; x < 90; ++x) {
+                cv::Vec3f& pixel = sphere.stack.images[i](y, x);
+                if (std::max({pixel[0], pixel[1], pixel[2]}) < 0.45F) continue;
+                sphere.stack.clipped[i](y, x) = 255;
+                pixel = {0.45F, 0.45F, 0.45F};
+            }
+    EXPECT_LT(largest_difference_to_lambert(shade(sphere).maps), 1e-6);
+}
+
+TEST(ShadingMaps, LeaveUnusedLightsOut) {
+    TexturedSphere sphere = textured_sphere(90);
+    sphere.lights[3].used = false;
+    sphere.lights[3].direction = {0, 0, 0};
+    sphere.stack.images[3].setTo(cv::Scalar(7, 7, 7));
+    EXPECT_LT(largest_difference_to_lambert(shade(sphere).maps), 1e-6);
+}
+
+TEST(ShadingMaps, DoNotGlowInTheDarkAndAreNeverNegative) {
+    TexturedSphere sphere = textured_sphere(60);
+    for (cv::Mat3f& image : sphere.stack.images) image += cv::Scalar(0.1, 0.1, 0.1);
+    add_noise(sphere.stack, 0.05);
+    const ShadingMaps maps = shade(sphere).maps;
+    for (int k = 0; k < maps.texels; ++k) {
+        EXPECT_EQ(maps.radiance(k, 0), cv::Vec3f(0, 0, 0));
+        for (int level = 0; level < maps.levels; ++level)
+            for (int c = 0; c < 3; ++c) EXPECT_GE(maps.radiance(k, level)[c], 0.0F);
+    }
+}
+
+TEST(ShadingMaps, OfATexelNeverLitFallBackToItsAlbedo) {
+    TexturedSphere sphere = textured_sphere(60);
+    for (cv::Mat1b& clipped : sphere.stack.clipped) clipped.setTo(255, sphere.index.label == 4);
+    const ShadingMaps maps = shade(sphere).maps;
+    EXPECT_LT(largest_difference_to_lambert(maps), 1e-6);
+    EXPECT_EQ(maps.samples(3, 5), 0);
+    EXPECT_GT(maps.radiance(3, 10)[0], 0.2F);
+}
+
+TEST(ShadingMaps, SkipValuesThatAreNotNumbers) {
+    TexturedSphere sphere = textured_sphere(60);
+    sphere.stack.images[2](30, 30)[1] = std::nanf("");
+    sphere.albedo.albedo(31, 30)[0] = std::nanf("");
+    EXPECT_LT(largest_difference_to_lambert(shade(sphere).maps), 1e-6);
+}
+
+TEST(ShadingMaps, SameBitsOnAnyNumberOfThreads) {
+    TexturedSphere sphere = textured_sphere(90);
+    add_noise(sphere.stack, 0.02);
+    WorkContext work;
+    work.threads = 1;
+    const ShadingMaps one = shade(sphere, {}, work).maps;
+    for (const int threads : {2, 8}) {
+        work.threads = threads;
+        const ShadingMaps many = shade(sphere, {}, work).maps;
+        EXPECT_EQ(cv::norm(one.radiance, many.radiance, cv::NORM_INF), 0);
+        EXPECT_EQ(cv::norm(one.samples, many.samples, cv::NORM_INF), 0);
+    }
+}
+
+TEST(ShadingMaps, RefuseInputsThatDoNotAgree) {
+    const TexturedSphere good = textured_sphere(30);
+    TexturedSphere bad = good;
+    bad.lights.pop_back();
+    EXPECT_THROW(shade(bad), InputError);
+    bad = good;
+    bad.normals.normal = cv::Mat3f(10, 10);
+    EXPECT_THROW(shade(bad), InputError);
+    bad = good;
+    bad.index.texels = 5;
+    EXPECT_THROW(shade(bad), InputError);
+    bad = good;
+    bad.lights[1].intensity = {1, 0, 1};
+    EXPECT_THROW(shade(bad), InputError);
+    bad = good;
+    bad.lights[1].direction *= 2;
+    EXPECT_THROW(shade(bad), InputError);
+}
+
+TEST(ShadingMaps, StopWhenAsked) {
+    std::stop_source stop;
+    stop.request_stop();
+    WorkContext work;
+    work.stop = stop.get_token();
+    EXPECT_THROW(shade(textured_sphere(30), {}, work), Cancelled);
+}
+
+TEST(ShadingOptions, NameTheFieldAndItsRange) {
+    ShadingOptions options;
+    options.levels = 1;
+    EXPECT_THAT([&] { options.validate(); },
+                testing::ThrowsMessage<InputError>(testing::HasSubstr("levels is 1, allowed are 2...256")));
+}
+
+}  // namespace
+}  // namespace darkbox
