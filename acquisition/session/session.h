@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "acquisition/frame/ids.h"
@@ -14,6 +15,15 @@ enum class FrameKind { lit, dark, ambient, flat, ball };
 
 /// How samples map to radiance.
 enum class TransferCurve { linear, srgb };
+
+/// The names used in session.json, and back; no value for a name that is not one.
+std::string_view name(FrameKind kind);
+std::string_view name(TransferCurve curve);
+std::optional<FrameKind> frame_kind_from_name(std::string_view name);
+std::optional<TransferCurve> transfer_curve_from_name(std::string_view name);
+
+/// The time of day in UTC to the millisecond: "2026-01-31T23:59:59.999Z".
+std::string iso8601_now();
 
 /// One frame as the manifest (session.json) describes it. Times are nanoseconds on the capture's clock; imported
 /// pictures have none.

@@ -34,8 +34,9 @@ public:
     /// In the order in which they were acknowledged.
     const std::vector<FrameRecord>& acknowledged() const;
 
-    /// A frame off the sensor, kept without loss: as TIFF. `record.file`, sizes, format and sha256 are filled in here
-    /// from the frame; kind, lamp, times and verification are the caller's.
+    /// A frame off the sensor, kept without loss: as TIFF. Sizes, format, sequence, timestamp, controls and sha256 are
+    /// filled in here from the frame; kind, lamp, lamp times and verification are the caller's. An empty `record.file`
+    /// becomes "frames/NNNN_NAME.tif" from the count and the lamp's name or the kind.
     void add(const Frame& frame, FrameRecord record);
     /// A picture kept as its bytes; `record.file` names it ("frames/cat.00.png").
     void add(std::span<const std::byte> bytes, FrameRecord record);
