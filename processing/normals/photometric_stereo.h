@@ -21,11 +21,12 @@ struct PhotometricStereoOptions {
 struct PhotometricStereoResult {
     NormalMap normals;
     AlbedoMap albedo;
-    cv::Mat1f residual;       ///< RMS over lights of (I - rho N.L), linear radiance
-    cv::Mat1b lights_used;    ///< photographs behind each pixel
-    double residual_rms = 0;  ///< over all valid pixels
-    std::size_t pixels = 0;   ///< valid ones
-    double seconds = 0;       ///< of solving
+    cv::Mat1f residual;          ///< RMS over lights of (I - rho N.L), linear radiance
+    cv::Mat1b lights_used;       ///< photographs behind each pixel
+    double residual_rms = 0;     ///< over all valid pixels
+    std::size_t pixels = 0;      ///< valid ones
+    std::size_t not_finite = 0;  ///< pixels of the mask left out for a sample that is not a finite number
+    double seconds = 0;          ///< of solving
 };
 
 /// Least squares on I = rho N.L over all used lights (Woodham 1980, Optical Engineering 19(1); thesis, photometric
