@@ -20,8 +20,8 @@ void require_light(const Light& light) {
     if (!(std::abs(length - 1.0) <= unit_tolerance))
         throw InputError(fmt::format("the direction of {} has length {:.4g} instead of 1", name_of(light), length),
                          "give a unit vector from the object to the light");
-    if (!light.intensity.allFinite() || light.intensity.minCoeff() <= 0)
-        throw InputError(fmt::format("the intensity of {} is {:.4g}, {:.4g}, {:.4g}: all three must be above 0",
+    if (!light.intensity.allFinite() || light.intensity.minCoeff() < 0)
+        throw InputError(fmt::format("the intensity of {} is {:.4g}, {:.4g}, {:.4g}: none may be negative",
                                      name_of(light), light.intensity[0], light.intensity[1], light.intensity[2]),
                          "correct the intensity, or mark the light as not used");
 }

@@ -14,7 +14,7 @@ void require_size(const char* name, cv::Size size, cv::Size expected);
 /// Labels are 0...texels.
 void require_labels(const IndexMap& index);
 
-/// At least one used light; each used one with a unit direction and a positive, finite intensity.
+/// At least one used light; each used one with a unit direction and a finite intensity that is not negative.
 void require_lights(const Lights& lights);
 
 }  // namespace darkbox

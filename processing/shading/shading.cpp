@@ -80,6 +80,14 @@ void measure_texel(const Views& views, const Pixels& pixels, int row, ShadingMap
     }
 }
 
+/// The photographs are divided by them.
+void require_intensities(const Lights& lights) {
+    for (const Light& light : lights)
+        if (light.used && !(light.intensity.minCoeff() > 0))
+            throw InputError(fmt::format("the light of {} has an intensity of zero", light.file),
+                             "correct the intensity, or mark the light as not used");
+}
+
 void require_inputs(const PhotoStack& stack, const Lights& lights, const NormalMap& normals, const AlbedoMap& albedo,
                     const IndexMap& index) {
     require_consistent(stack);
@@ -87,6 +95,7 @@ void require_inputs(const PhotoStack& stack, const Lights& lights, const NormalM
         throw InputError(fmt::format("there are {} photographs but {} lights", stack.images.size(), lights.size()),
                          "give one light for each photograph, in the same order");
     require_lights(lights);
+    require_intensities(lights);
     require_size("the normal map", normals.normal.size(), stack.size());
     require_size("the normal map's mask", normals.valid.size(), stack.size());
     require_size("the albedo map", albedo.albedo.size(), stack.size());
