@@ -60,19 +60,22 @@ void GainEstimator::add(double r, const cv::Vec3d& albedo, const cv::Vec3d& radi
     }
 }
 
-const GainEstimator::Fit& GainEstimator::choice(std::size_t level) const {
-    const int enough = std::max(fewest_samples, all_[level].samples / fewest_lit_of_all);
-    return lit_[level].samples >= enough ? lit_[level] : all_[level];
+bool GainEstimator::is_lit(std::size_t level) const {
+    return lit_[level].samples >= std::max(fewest_samples, all_[level].samples / fewest_lit_of_all);
 }
 
 GainCurve GainEstimator::curve() const {
+    std::size_t lit_levels = 0;
+    for (std::size_t level = 1; level < all_.size(); ++level) lit_levels += is_lit(level) ? 1 : 0;
+    // A surface that is dark at every level is dark; one that is dark at some of them lies in shadow there.
+    const std::vector<Fit>& fits = lit_levels > 0 ? lit_ : all_;
+
     GainCurve curve;
     std::vector<bool> good;
     for (std::size_t level = 0; level < all_.size(); ++level) {
-        const Fit& fit = choice(level);
-        good.push_back(fit.samples >= fewest_samples);
-        curve.gain.push_back(fit.gain());
-        curve.samples.push_back(good.back() ? fit.samples : 0);
+        good.push_back(lit_levels > 0 ? is_lit(level) : all_[level].samples >= fewest_samples);
+        curve.gain.push_back(fits[level].gain());
+        curve.samples.push_back(good.back() ? fits[level].samples : 0);
     }
     bridge(curve.gain, good);
     return curve;

@@ -14,9 +14,9 @@ struct GainCurve {
 /// Samples of one texel re-sampled at the levels r_i = i / (levels - 1). A sample is set against its own pixel's
 /// albedo, so that a texel of mixed albedo, lit unevenly, does not take albedo for shading. The gain of a level is the
 /// least-squares factor of albedo x r over the samples within one level's distance, weighted by the hat about the
-/// level. Samples far below Lambert's prediction are shadowed, and left out where enough others remain. Levels with
-/// thin data are interpolated in gain; beyond the last good level its gain holds, which scales the radiance with r.
-/// Thread-compatible.
+/// level. Samples far below Lambert's prediction are shadowed and left out, unless the texel is that dark at all
+/// levels. Levels with thin data are interpolated in gain; beyond the last good level its gain holds, which scales the
+/// radiance with r. Thread-compatible.
 class GainEstimator {
 public:
     explicit GainEstimator(int levels) : lit_(levels), all_(levels) {}
@@ -37,7 +37,8 @@ private:
         cv::Vec3d gain() const;
     };
 
-    const Fit& choice(std::size_t level) const;
+    /// Enough samples, and enough of them not shadowed.
+    bool is_lit(std::size_t level) const;
 
     std::vector<Fit> lit_;  ///< of samples that are not shadowed
     std::vector<Fit> all_;

@@ -55,6 +55,13 @@ TEST(GainCurve, KeepsWhatIsDarkThroughout) {
     for (const cv::Vec3d& gain : estimator.curve().gain) EXPECT_NEAR(gain[0], 0.2, 1e-12);
 }
 
+TEST(GainCurve, BridgesALevelThatLiesInShadow) {
+    GainEstimator estimator(11);
+    add_even(estimator, 0.4, 1, 400, 0.9);
+    add_even(estimator, 0, 0.4, 400, 0.1);
+    for (const cv::Vec3d& gain : estimator.curve().gain) EXPECT_NEAR(gain[1], 0.9, 1e-12);
+}
+
 TEST(GainCurve, BridgesAGapAndHoldsBeyondTheLastSample) {
     GainEstimator estimator(11);
     add_even(estimator, 0.19, 0.21, 50, 1.2);
