@@ -3,9 +3,9 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <numeric>
-#include <optional>
 
 #include "processing/texels/centre_blocks.h"
 #include "processing/texels/random.h"
@@ -53,42 +53,57 @@ public:
           blocks_(blocks),
           random_(seed),
           distance_(points.rows, std::numeric_limits<float>::infinity()),
+          measured_(points.rows),
           potential_(blocks.count(), 0.0) {}
 
     cv::Mat1f centres(int clusters) {
         std::vector<int> chosen{static_cast<int>(random_.uniform() * points_.rows)};
-        approach(chosen.back());
+        measure(chosen);
+        approach(0);
         while (static_cast<int>(chosen.size()) < clusters) {
-            const std::optional<int> next = best_candidate();
-            if (!next) break;
-            chosen.push_back(*next);
-            approach(*next);
+            const double total = std::accumulate(potential_.begin(), potential_.end(), 0.0);
+            if (!(total > 0)) break;  // every point lies on a centre already
+            // Eight candidates are measured in the time of one.
+            std::vector<int> candidates(CentreBlocks::lanes);
+            for (int& candidate : candidates) candidate = draw(total);
+            const std::vector<double> after = measure(candidates);
+            const auto best = static_cast<int>(std::min_element(after.begin(), after.end()) - after.begin());
+            chosen.push_back(candidates[best]);
+            approach(best);
         }
         return rows_at(points_, chosen);
     }
 
 private:
-    /// Lowers every point's distance to that of its nearest centre, now that `centre` is one.
-    void approach(int centre) {
-        const CentreBlocks measure(points_.row(centre));
+    /// Distances of all points to each candidate, and what the potential would become with it as a centre.
+    std::vector<double> measure(const std::vector<int>& candidates) {
+        const CentreBlocks blocks_of_centres(rows_at(points_, candidates));
+        std::vector<std::array<double, CentreBlocks::lanes>> partial(blocks_.count());
+        blocks_.for_each([&](int block) {
+            std::array<double, CentreBlocks::lanes> sum{};
+            for (int i = blocks_.begin(block); i < blocks_.end(block); ++i) {
+                measured_[i] = blocks_of_centres.distances(points_[i], 0);
+                for (int lane = 0; lane < CentreBlocks::lanes; ++lane)
+                    sum[lane] += std::min(distance_[i], measured_[i][lane]);
+            }
+            partial[block] = sum;
+        });
+        std::vector<double> potentials(candidates.size(), 0.0);
+        for (const auto& sum : partial)
+            for (std::size_t lane = 0; lane < candidates.size(); ++lane) potentials[lane] += sum[lane];
+        return potentials;
+    }
+
+    /// Lowers every point's distance to that of its nearest centre, now that the measured candidate is one.
+    void approach(int candidate) {
         blocks_.for_each([&](int block) {
             double sum = 0;
             for (int i = blocks_.begin(block); i < blocks_.end(block); ++i) {
-                distance_[i] = std::min(distance_[i], measure.distances(points_[i], 0)[0]);
+                distance_[i] = std::min(distance_[i], measured_[i][candidate]);
                 sum += distance_[i];
             }
             potential_[block] = sum;
         });
-    }
-
-    /// Eight candidates are measured in the time of one. Nothing when every point lies on a centre already.
-    std::optional<int> best_candidate() {
-        const double total = std::accumulate(potential_.begin(), potential_.end(), 0.0);
-        if (!(total > 0)) return std::nullopt;
-        std::vector<int> candidates(CentreBlocks::lanes);
-        for (int& candidate : candidates) candidate = draw(total);
-        const std::vector<double> after = potentials_after(candidates);
-        return candidates[std::min_element(after.begin(), after.end()) - after.begin()];
     }
 
     /// A point with probability proportional to its squared distance, never one at distance zero.
@@ -110,29 +125,12 @@ private:
         return static_cast<int>(std::max_element(distance_.begin(), distance_.end()) - distance_.begin());
     }
 
-    std::vector<double> potentials_after(const std::vector<int>& candidates) const {
-        const CentreBlocks measure(rows_at(points_, candidates));
-        std::vector<std::array<double, CentreBlocks::lanes>> partial(blocks_.count());
-        blocks_.for_each([&](int block) {
-            std::array<double, CentreBlocks::lanes> sum{};
-            for (int i = blocks_.begin(block); i < blocks_.end(block); ++i) {
-                const CentreBlocks::Distances measured = measure.distances(points_[i], 0);
-                for (int lane = 0; lane < CentreBlocks::lanes; ++lane)
-                    sum[lane] += std::min(distance_[i], measured[lane]);
-            }
-            partial[block] = sum;
-        });
-        std::vector<double> sums(CentreBlocks::lanes, 0.0);
-        for (const auto& sum : partial)
-            for (int lane = 0; lane < CentreBlocks::lanes; ++lane) sums[lane] += sum[lane];
-        return sums;
-    }
-
     const cv::Mat1f& points_;
     const Blocks& blocks_;
     SplitMix64 random_;
-    std::vector<float> distance_;    ///< squared, of each point to its nearest centre
-    std::vector<double> potential_;  ///< sum of distances in each block
+    std::vector<float> distance_;                    ///< squared, of each point to its nearest centre
+    std::vector<CentreBlocks::Distances> measured_;  ///< to the candidates
+    std::vector<double> potential_;                  ///< sum of distances in each block
 };
 
 /// Points added up by cluster.
