@@ -19,11 +19,12 @@ struct LevelPosition {
     }
 };
 
-/// S(k, r) by linear interpolation over r. `label` is 1...texels.
-inline cv::Vec3f shading_at(const ShadingMaps& maps, int label, float r) {
+/// sum += intensity x S(k, r), S by linear interpolation over r. `label` is 1...texels.
+inline void add_shading(cv::Vec3f& sum, const cv::Vec3f& intensity, const ShadingMaps& maps, int label, float r) {
     const LevelPosition position(r, maps.levels);
-    const cv::Vec3f* row = maps.radiance[label - 1] + position.below;
-    return row[0] * (1 - position.fraction) + row[1] * position.fraction;
+    const cv::Vec3f* level = maps.radiance[label - 1] + position.below;
+    for (int c = 0; c < 3; ++c)
+        sum[c] += intensity[c] * (level[0][c] + position.fraction * (level[1][c] - level[0][c]));
 }
 
 }  // namespace darkbox

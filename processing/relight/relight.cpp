@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 
 #include "acquisition/frame/error.h"
 #include "processing/maps/parallel.h"
@@ -81,27 +83,51 @@ void require_probe(const Environment& environment) {
                 "give a probe whose values are finite and not negative");
 }
 
-/// The pixel's own albedo over its texel's mean.
-cv::Vec3f detail(const RelightScene& scene, int y, int x, int label) {
-    cv::Vec3f ratio(1, 1, 1);
-    if (scene.albedo.valid(y, x) == 0 || !is_finite(scene.albedo.albedo(y, x))) return ratio;
-    const cv::Vec3f& mean = scene.shading.mean_albedo(label - 1, 0);
-    for (int c = 0; c < 3; ++c)
-        if (mean[c] > smallest_mean_albedo) ratio[c] = std::max(0.0F, scene.albedo.albedo(y, x)[c] / mean[c]);
-    return ratio;
-}
+/// Exposure, and for Lookup::detail the pixel's own albedo over its texel's mean.
+class PixelScale {
+public:
+    PixelScale(const RelightScene& scene, const RelightOptions& options)
+        : exposure_(static_cast<float>(options.exposure)), per_albedo_(scene.index.texels, cv::Vec3f(0, 0, 0)) {
+        if (options.lookup == Lookup::thesis) return;
+        for (int k = 0; k < scene.index.texels; ++k)
+            for (int c = 0; c < 3; ++c)
+                if (const float mean = scene.shading.mean_albedo(k, 0)[c]; mean > smallest_mean_albedo)
+                    per_albedo_[k][c] = exposure_ / mean;
+    }
+
+    /// A texel without albedo in a channel keeps its radiance; an albedo that is negative or not a number is black.
+    float operator()(int label, const cv::Vec3f& albedo, int channel) const {
+        const float scale = per_albedo_[label - 1][channel];
+        return scale > 0 ? std::max(0.0F, scale * albedo[channel]) : exposure_;
+    }
+
+    float without_albedo() const { return exposure_; }
+
+private:
+    float exposure_;
+    std::vector<cv::Vec3f> per_albedo_;  ///< of each texel; 0 = its radiance is not scaled by albedo
+};
 
 /// Every pixel of the object through `radiance(normal, label)`, which says how its texel is lit.
 template <class Radiance>
 cv::Mat3f render(const RelightScene& scene, const RelightOptions& options, const Radiance& radiance) {
-    cv::Mat3f image(scene.index.label.size(), cv::Vec3f(0, 0, 0));
-    const auto exposure = static_cast<float>(options.exposure);
+    cv::Mat3f image(scene.index.label.size());
+    const PixelScale scale(scene, options);
     tbb::parallel_for(0, image.rows, [&](int y) {
+        const std::uint16_t* label = scene.index.label[y];
+        const std::uint8_t* has_normal = scene.normals.valid[y];
+        const std::uint8_t* has_albedo = scene.albedo.valid[y];
+        const cv::Vec3f* normal = scene.normals.normal[y];
+        const cv::Vec3f* albedo = scene.albedo.albedo[y];
+        cv::Vec3f* out = image[y];
         for (int x = 0; x < image.cols; ++x) {
-            const int label = scene.index.label(y, x);
-            if (label == 0 || scene.normals.valid(y, x) == 0) continue;
-            const cv::Vec3f lit = exposure * radiance(scene.normals.normal(y, x), label);
-            image(y, x) = options.lookup == Lookup::detail ? lit.mul(detail(scene, y, x, label)) : lit;
+            if (label[x] == 0 || has_normal[x] == 0) {
+                out[x] = cv::Vec3f(0, 0, 0);
+                continue;
+            }
+            const cv::Vec3f lit = radiance(normal[x], label[x]);
+            for (int c = 0; c < 3; ++c)
+                out[x][c] = lit[c] * (has_albedo[x] != 0 ? scale(label[x], albedo[x], c) : scale.without_albedo());
         }
     });
     return image;
@@ -138,7 +164,7 @@ RelightResult relight(const RelightScene& scene, const Lights& lights, const Rel
             result.image = render(scene, options, [&](const cv::Vec3f& normal, int label) {
                 cv::Vec3f sum(0, 0, 0);
                 for (const DistantLight& light : used)
-                    sum += light.intensity.mul(shading_at(scene.shading, label, coefficient(normal, light.direction)));
+                    add_shading(sum, light.intensity, scene.shading, label, coefficient(normal, light.direction));
                 return sum;
             });
         });
@@ -174,7 +200,9 @@ cv::Mat3f at_constant_coefficient(const RelightScene& scene, double r, const Rel
     require_range("the coefficient r", r, 0, 1);
     return on_threads_of(work, [&] {
         return render(scene, options, [&](const cv::Vec3f&, int label) {
-            return shading_at(scene.shading, label, static_cast<float>(r));
+            cv::Vec3f shading(0, 0, 0);
+            add_shading(shading, {1, 1, 1}, scene.shading, label, static_cast<float>(r));
+            return shading;
         });
     });
 }
