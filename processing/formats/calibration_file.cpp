@@ -1,0 +1,100 @@
+#include "processing/formats/calibration_file.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+
+#include "processing/formats/json_file.h"
+
+namespace darkbox {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using nlohmann::ordered_json;
+
+ordered_json triple(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
+Eigen::Vector3d triple_in(const json& j) {
+    return {j.at(0).get<double>(), j.at(1).get<double>(), j.at(2).get<double>()};
+}
+
+ordered_json light_json(const Light& light, const std::string& lamp, const std::optional<Highlight>& highlight) {
+    ordered_json j{{"file", light.file},
+                   {"lamp", lamp},
+                   {"direction", triple(light.direction)},
+                   {"sigma_deg", light.sigma_deg},
+                   {"intensity", triple(light.intensity)},
+                   {"used", light.used}};
+    if (highlight)
+        j["highlight"] = {{"u", highlight->u},
+                          {"v", highlight->v},
+                          {"sigma_px", highlight->sigma_px},
+                          {"clipped", highlight->clipped}};
+    return j;
+}
+
+Light light_in(const json& j) {
+    Light light;
+    light.file = j.at("file").get<std::string>();
+    light.direction = triple_in(j.at("direction"));
+    light.sigma_deg = j.at("sigma_deg").get<double>();
+    light.intensity = triple_in(j.at("intensity"));
+    light.used = j.at("used").get<bool>();
+    return light;
+}
+
+std::optional<Highlight> highlight_in(const json& j) {
+    if (!j.contains("highlight")) return std::nullopt;
+    const json& h = j.at("highlight");
+    return Highlight{h.at("u").get<double>(), h.at("v").get<double>(), h.at("sigma_px").get<double>(),
+                     h.at("clipped").get<bool>()};
+}
+
+StoredCalibration calibration_in(const json& j) {
+    StoredCalibration stored;
+    Calibration& calibration = stored.calibration;
+    for (const json& light : j.at("lights")) {
+        calibration.lights.push_back(light_in(light));
+        calibration.highlights.push_back(highlight_in(light));
+        stored.lamps.push_back(light.value("lamp", ""));
+    }
+    for (const json& ball : j.at("balls"))
+        calibration.balls.push_back({ball.at("x").get<double>(), ball.at("y").get<double>(),
+                                     ball.at("radius").get<double>(), ball.at("confidence").get<double>()});
+    const json& condition = j.at("condition_number");
+    calibration.condition_number =
+        condition.is_null() ? std::numeric_limits<double>::infinity() : condition.get<double>();
+    calibration.contour_rms_px = j.at("contour_rms_px").get<double>();
+    calibration.method = j.at("method").get<std::string>();
+    calibration.warnings = j.at("warnings").get<std::vector<std::string>>();
+    calibration.rejected = j.at("rejected").get<std::vector<std::string>>();
+    return stored;
+}
+
+}  // namespace
+
+void write_calibration(const fs::path& path, const Calibration& calibration, const std::vector<std::string>& lamps) {
+    ordered_json lights = ordered_json::array(), balls = ordered_json::array();
+    for (std::size_t i = 0; i < calibration.lights.size(); ++i)
+        lights.push_back(light_json(calibration.lights[i], i < lamps.size() ? lamps[i] : "",
+                                    i < calibration.highlights.size() ? calibration.highlights[i] : std::nullopt));
+    for (const Ball& ball : calibration.balls)
+        balls.push_back({{"x", ball.x}, {"y", ball.y}, {"radius", ball.radius}, {"confidence", ball.confidence}});
+    ordered_json j{{"frame", "viewer: x right, y up, z from the object to the camera; pixels: u right, v down"},
+                   {"method", calibration.method},
+                   {"condition_number", calibration.condition_number},  // infinity becomes null
+                   {"contour_rms_px", calibration.contour_rms_px},
+                   {"balls", balls},
+                   {"lights", lights},
+                   {"warnings", calibration.warnings},
+                   {"rejected", calibration.rejected}};
+    write_json(path, j);
+}
+
+StoredCalibration read_calibration(const fs::path& path) {
+    const json parsed = read_json(path);
+    return reading_keys(path, "a calibration", [&] { return calibration_in(parsed); });
+}
+
+}  // namespace darkbox

@@ -1,0 +1,119 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "processing/formats/atomic_file.h"
+#include "processing/formats/calibration_file.h"
+#include "processing/formats/environment_file.h"
+#include "processing/formats/exr.h"
+#include "processing/formats/ply.h"
+#include "tests/support/test_data.h"
+#include "tests/support/throws.h"
+
+namespace darkbox {
+namespace {
+
+using test::input_error_of;
+using testing::HasSubstr;
+namespace fs = std::filesystem;
+
+class Files : public testing::Test {
+protected:
+    fs::path at(const std::string& name) const { return folder_.path() / name; }
+    test::TemporaryFolder folder_;
+};
+
+TEST_F(Files, WriteReplacesWholeAndLeavesNothingBehind) {
+    write_file(at("deep/er/a.txt"), "one");
+    write_file(at("deep/er/a.txt"), "two");
+    EXPECT_EQ(read_text(at("deep/er/a.txt")), "two");
+    EXPECT_EQ(std::distance(fs::directory_iterator(at("deep/er")), {}), 1);
+}
+
+TEST_F(Files, AFailedWriteNamesThePathAndKeepsTheOldFile) {
+    write_file(at("a.txt"), "old");
+    EXPECT_THAT(input_error_of([&] { write_file(at("a.txt") / "b.txt", "new"); }), HasSubstr("a.txt"));
+    EXPECT_EQ(read_text(at("a.txt")), "old");
+    EXPECT_THAT(input_error_of([&] { write_file("/dev/full/x", "new"); }), HasSubstr("/dev/full"));
+}
+
+TEST_F(Files, CalibrationComesBack) {
+    Calibration calibration;
+    calibration.lights.resize(2);
+    calibration.lights[0] = {"a.png", Eigen::Vector3d(0.1, 0.2, 0.97).normalized(), {1, 2, 3}, 0.12, true};
+    calibration.lights[1] = {"b.png", {0, 0, 1}, {1, 1, 1}, 0, false};
+    calibration.highlights = {Highlight{10.5, 20.25, 0.1, true}, std::nullopt};
+    calibration.balls = {{100.5, 90.25, 40.125, 0.9}};
+    calibration.condition_number = std::numeric_limits<double>::infinity();
+    calibration.method = "refined";
+    calibration.warnings = {"b.png has no highlight"};
+    write_calibration(at("lights.json"), calibration, {"lamp-1", "lamp-2"});
+    const StoredCalibration stored = read_calibration(at("lights.json"));
+    const Calibration& read = stored.calibration;
+    ASSERT_EQ(read.lights.size(), 2u);
+    EXPECT_EQ(read.lights[0].direction, calibration.lights[0].direction);
+    EXPECT_EQ(read.lights[0].intensity, calibration.lights[0].intensity);
+    EXPECT_FALSE(read.lights[1].used);
+    EXPECT_EQ(read.highlights[0]->v, 20.25);
+    EXPECT_FALSE(read.highlights[1]);
+    EXPECT_EQ(read.balls[0].radius, 40.125);
+    EXPECT_TRUE(std::isinf(read.condition_number));
+    EXPECT_EQ(read.warnings, calibration.warnings);
+    EXPECT_EQ(stored.lamps[1], "lamp-2");
+}
+
+TEST_F(Files, AFileThatIsNoCalibrationIsNamed) {
+    write_file(at("lights.json"), "{\"lights\": 3}");
+    EXPECT_THAT(input_error_of([&] { read_calibration(at("lights.json")); }),
+                HasSubstr("lights.json is not a calibration"));
+    write_file(at("lights.json"), "{");
+    EXPECT_THAT(input_error_of([&] { read_calibration(at("lights.json")); }), HasSubstr("lights.json is not JSON"));
+}
+
+TEST_F(Files, EnvironmentsAreCheckedForShapeAndNumbers) {
+    cv::Mat3f probe(8, 16, cv::Vec3f(1, 2, 3));
+    write_exr(at("e.exr"), probe);
+    EXPECT_EQ(read_environment(at("e.exr")).radiance(3, 3), cv::Vec3f(1, 2, 3));
+    probe(1, 1)[0] = -1;
+    write_exr(at("e.exr"), probe);
+    EXPECT_THAT(input_error_of([&] { read_environment(at("e.exr")); }), HasSubstr("negative"));
+    write_exr(at("e.exr"), cv::Mat3f(8, 8, cv::Vec3f(1, 1, 1)));
+    EXPECT_THAT(input_error_of([&] { read_environment(at("e.exr")); }), HasSubstr("twice as wide"));
+    write_file(at("e.hdr"), "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8 +X 16\nshort");
+    EXPECT_THAT(input_error_of([&] { read_environment(at("e.hdr")); }), HasSubstr("damaged or cut short"));
+    write_file(at("e.hdr"), "P6 1 1 255");
+    EXPECT_THAT(input_error_of([&] { read_environment(at("e.hdr")); }), HasSubstr("not a Radiance"));
+}
+
+TEST(RealProbes, AreReadAndBrightestAtTheirSky) {
+    DARKBOX_NEED_DATA(data, "hdr_probes");
+    for (const auto& entry : fs::directory_iterator(data)) {
+        if (entry.path().extension() != ".hdr") continue;
+        const Environment probe = read_environment(entry.path());
+        EXPECT_EQ(probe.radiance.size(), cv::Size(256, 128));
+        EXPECT_GT(cv::mean(probe.radiance)[0], 0.01) << entry.path();
+        const auto bytes = read_file(entry.path());
+        test::TemporaryFolder folder;
+        write_file(folder.path() / "cut.hdr", std::span(bytes).first(bytes.size() / 2));
+        EXPECT_THROW(read_environment(folder.path() / "cut.hdr"), InputError);
+    }
+}
+
+TEST_F(Files, PlyHasAVertexPerPixelAndTwoTrianglesPerSquare) {
+    NormalMap normals{cv::Mat3f(3, 3, cv::Vec3f(0, 0, 1)), cv::Mat1b(3, 3, uchar{255})};
+    normals.valid(0, 0) = 0;
+    const AlbedoMap albedo{cv::Mat3f(3, 3, cv::Vec3f(1, 0, 0)), normals.valid};
+    write_ply(at("s.ply"), cv::Mat1f(3, 3, 0.0F), normals, albedo);
+    const std::string ply = read_text(at("s.ply"));
+    EXPECT_THAT(ply, HasSubstr("units: pixels"));
+    EXPECT_THAT(ply, HasSubstr("element vertex 8\n"));
+    EXPECT_THAT(ply, HasSubstr("element face 6\n"));
+    const std::size_t body = ply.size() - (ply.find("end_header\n") + 11);
+    EXPECT_EQ(body, 8u * (6 * 4 + 3) + 6u * (1 + 3 * 4));
+    write_ply(at("mm.ply"), cv::Mat1f(3, 3, 0.0F), normals, albedo, 0.25);
+    EXPECT_THAT(read_text(at("mm.ply")), HasSubstr("millimetres (0.25 per pixel)"));
+}
+
+}  // namespace
+}  // namespace darkbox
