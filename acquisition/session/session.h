@@ -47,6 +47,8 @@ struct FrameRecord {
     bool verified = false;
     std::string verification;  ///< what was checked and found, in words
     std::string sha256;        ///< of the file, lower-case hex; filled by SessionWriter
+
+    friend bool operator==(const FrameRecord&, const FrameRecord&) = default;
 };
 
 /// Something worth knowing that happened during a capture.
