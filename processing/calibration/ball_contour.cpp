@@ -1,0 +1,132 @@
+#include "processing/calibration/ball_contour.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+#include "acquisition/frame/error.h"
+
+namespace darkbox {
+namespace {
+
+constexpr double step_px = 0.5;
+constexpr double blur_px = 0.8;
+constexpr double floor_radiance = 1.0 / 255;
+
+struct Reading {
+    cv::Point2d at;
+    double strength = 0;  ///< change per pixel relative to the brightness there
+};
+
+std::optional<double> sample(const cv::Mat1f& image, double x, double y) {
+    const int left = static_cast<int>(std::floor(x)), top = static_cast<int>(std::floor(y));
+    if (left < 0 || top < 0 || left + 1 >= image.cols || top + 1 >= image.rows) return std::nullopt;
+    const double fx = x - left, fy = y - top;
+    const double above = (1 - fx) * image(top, left) + fx * image(top, left + 1);
+    const double below = (1 - fx) * image(top + 1, left) + fx * image(top + 1, left + 1);
+    return (1 - fy) * above + fy * below;
+}
+
+/// Brightness along a radius, `reach` px to both sides of the circle; empty where it leaves the picture.
+std::vector<double> profile(const cv::Mat1f& image, const Circle& circle, cv::Point2d out, double reach) {
+    std::vector<double> values;
+    const int steps = static_cast<int>(std::ceil(reach / step_px)) + 1;
+    for (int i = -steps; i <= steps; ++i) {
+        const double radius = circle.radius + i * step_px;
+        const auto value = sample(image, circle.x + radius * out.x, circle.y + radius * out.y);
+        if (!value) return {};
+        values.push_back(*value);
+    }
+    return values;
+}
+
+std::optional<Reading> steepest(const cv::Mat1f& image, const Circle& circle, double angle, double reach) {
+    const cv::Point2d out(std::cos(angle), std::sin(angle));
+    const std::vector<double> p = profile(image, circle, out, reach);
+    if (p.empty()) return std::nullopt;
+    std::vector<double> slope(p.size(), 0.0);
+    for (std::size_t i = 1; i + 1 < p.size(); ++i) slope[i] = std::abs(p[i + 1] - p[i - 1]) / (2 * step_px);
+    const auto peak = std::max_element(slope.begin() + 2, slope.end() - 2);
+    const auto i = static_cast<std::size_t>(peak - slope.begin());
+    const double before = slope[i - 1], at = slope[i], after = slope[i + 1];
+    if (!(at > before && at >= after)) return std::nullopt;  // steepest at the end of the reach: not this edge
+    const double shift = 0.5 * (before - after) / (before - 2 * at + after);
+    const double offset = (static_cast<double>(i) + shift - static_cast<double>(p.size() / 2)) * step_px;
+    const double radius = circle.radius + offset;
+    return Reading{{circle.x + radius * out.x, circle.y + radius * out.y}, at / (std::max(p[i], 0.0) + floor_radiance)};
+}
+
+std::size_t directions(const Circle& circle) {
+    return static_cast<std::size_t>(std::clamp(2 * std::numbers::pi * circle.radius, 48.0, 1440.0));
+}
+
+/// Readings all around, without those far weaker than the strong ones: dark on dark has no outline to read.
+std::vector<cv::Point2d> read_outline(const cv::Mat1f& image, const Circle& circle, double reach) {
+    std::vector<Reading> readings;
+    const std::size_t n = directions(circle);
+    for (std::size_t i = 0; i < n; ++i)
+        if (const auto r =
+                steepest(image, circle, 2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(n), reach))
+            readings.push_back(*r);
+    if (readings.empty()) return {};
+    std::vector<double> strengths;
+    for (const Reading& r : readings) strengths.push_back(r.strength);
+    const auto strong = strengths.begin() + static_cast<std::ptrdiff_t>(strengths.size() * 8 / 10);
+    std::nth_element(strengths.begin(), strong, strengths.end());
+    std::vector<cv::Point2d> points;
+    for (const Reading& r : readings)
+        if (r.strength > 0 && r.strength >= 0.2 * *strong) points.push_back(r.at);
+    return points;
+}
+
+BallContour settled(const cv::Mat1f& image, const Circle& start, double first_reach) {
+    BallContour contour;
+    contour.circle = start;
+    std::vector<cv::Point2d> points;
+    for (const double reach : {first_reach, first_reach / 2, 3.0, 2.0, 2.0}) {
+        points = read_outline(image, contour.circle, std::max(2.0, reach));
+        contour.circle = fit_circle_robust(points, contour.circle, std::max(0.3, reach / 8));
+    }
+    const double limit = 3 * std::max(0.1, robust_spread(points, contour.circle));
+    double squares = 0;
+    for (const auto& p : points) {
+        const double distance = contour.circle.distance(p);
+        if (std::abs(distance) > limit) continue;
+        contour.points.push_back(p);
+        squares += distance * distance;
+    }
+    contour.rejected = points.size() - contour.points.size();
+    if (!contour.points.empty()) contour.spread_px = std::sqrt(squares / static_cast<double>(contour.points.size()));
+    contour.support = static_cast<double>(contour.points.size()) / static_cast<double>(directions(contour.circle));
+    return contour;
+}
+
+}  // namespace
+
+BallContour measure_contour(const cv::Mat1f& radiance, const Circle& start) {
+    cv::Mat1f smooth;
+    cv::GaussianBlur(radiance, smooth, {}, blur_px);
+    return settled(smooth, start, std::clamp(0.04 * start.radius, 2.0, 8.0));
+}
+
+BallContour measure_mask(const cv::Mat1b& mask) {
+    std::vector<std::vector<cv::Point>> outlines;
+    cv::findContours(mask > 127, outlines, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
+    std::vector<cv::Point2d> inner;
+    for (const auto& outline : outlines)
+        for (const cv::Point& p : outline)
+            if (p.x > 0 && p.y > 0 && p.x + 1 < mask.cols && p.y + 1 < mask.rows) inner.emplace_back(p);
+    const auto rough = fit_circle_algebraic(inner);
+    if (!rough)
+        throw InputError("the ball's mask shows no round region",
+                         "paint the ball white on black, or give --ball X,Y,R");
+    cv::Mat1f image;
+    mask.convertTo(image, CV_32F, 1.0 / 255);
+    cv::GaussianBlur(image, image, {}, blur_px);
+    const Circle start = fit_circle_robust(inner, *rough, 1.0);
+    return settled(image, start, 4.0);
+}
+
+}  // namespace darkbox

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+namespace darkbox {
+
+/// Mean over frames and channels: the ball stands still while the lamps change, so its outline adds up and noise, cast
+/// shadows and single highlights average out.
+cv::Mat1f mean_over_frames(const std::vector<cv::Mat3f>& frames);
+
+/// The frames as luminance pictures no longer than `max_side`, and what one of their pixels measures in the frames'.
+struct ReducedFrames {
+    std::vector<cv::Mat1f> images;
+    double scale = 1;  ///< frame pixels per reduced pixel
+
+    double to_frame(double reduced) const { return (reduced + 0.5) * scale - 0.5; }
+};
+ReducedFrames reduce(const std::vector<cv::Mat3f>& frames, int max_side);
+
+/// Logarithm above a floor of about one 8-bit step: a dark ball before a dark wall shows as clearly as a bright one.
+cv::Mat1f compress(const cv::Mat1f& radiance);
+
+}  // namespace darkbox
