@@ -38,7 +38,8 @@ struct CaptureSummary {
 };
 
 /// Takes every shot of the plan that the writer does not hold yet; each frame is proven to be lit by its lamp before it
-/// is acknowledged (timestamps against the lamp's steady interval, then the picture). Lamps are dark when it returns or
+/// is acknowledged: by its timestamps against the lamp's steady interval, then by the picture (see picture_check.h),
+/// which a second exposure under the same lamp confirms. Lamps are dark when it returns or
 /// throws. Does not seal. Throws Cancelled, DeviceError, or InputError naming lamp, frame and cause.
 CaptureSummary run_capture(const CapturePlan& plan, const RigDescription& rig, LampArray& lamps, Camera& camera,
                            Clock& clock, SessionWriter& writer, const WorkContext& work = {});

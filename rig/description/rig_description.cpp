@@ -141,11 +141,12 @@ CameraDescription read_camera(TomlSection& section) {
 
 CaptureDescription read_capture(TomlSection& section) {
     CaptureDescription capture;
-    section.allow({"frame_deadline_s", "tries", "min_signal"});
+    section.allow({"frame_deadline_s", "tries", "min_signal", "max_dark"});
     capture.frame_deadline =
         Seconds(section.number("frame_deadline_s", {0.01, 600}).value_or(capture.frame_deadline.count()));
     capture.tries = static_cast<int>(section.integer("tries", {1, 100}).value_or(capture.tries));
     capture.min_signal = section.number("min_signal", {0.0001, 0.5}).value_or(capture.min_signal);
+    capture.max_dark = section.number("max_dark", {0, 0.5}).value_or(capture.max_dark);
     return capture;
 }
 

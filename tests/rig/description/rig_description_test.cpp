@@ -42,6 +42,7 @@ diameter_mm = 31.5
 frame_deadline_s = 3.5
 tries = 7
 min_signal = 0.01
+max_dark = 0.03
 [processing]
 [api]
 sessions = "/srv/sessions"
@@ -77,6 +78,7 @@ settle_ms = 8
     EXPECT_EQ(rig.capture.frame_deadline.count(), 3.5);
     EXPECT_EQ(rig.capture.tries, 7);
     EXPECT_EQ(rig.capture.min_signal, 0.01);
+    EXPECT_EQ(rig.capture.max_dark, 0.03);
     EXPECT_EQ(rig.sessions_folder, "/srv/sessions");
     EXPECT_EQ(rig.socket, "/run/darkbox.sock");
     EXPECT_EQ(rig.sim.scene, "teapot");

@@ -1,0 +1,108 @@
+#include "rig/capture/capture_session.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <fstream>
+#include <iterator>
+#include <span>
+#include <sstream>
+
+#include "acquisition/frame/error.h"
+
+namespace darkbox {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* rig_file = "rig.toml";
+/// The note that keeps the chosen lamps, so that a resume need not be told them again. Lamp names have no spaces.
+constexpr const char* lamps_note = "lamps: ";
+
+std::vector<std::string> lamps_of(const CapturePlan& plan, const RigDescription& rig) {
+    std::vector<std::string> names;
+    for (const Shot& shot : plan.shots)
+        if (shot.lamp) names.push_back(rig.lamps.at(shot.lamp->value).name);
+    return names;
+}
+
+/// The lamps that an interrupted session was begun with.
+std::vector<std::string> lamps_of(const SessionInfo& info) {
+    const std::string prefix = lamps_note;
+    for (const std::string& note : info.notes) {
+        if (note.compare(0, prefix.size(), prefix) != 0) continue;
+        std::istringstream words(note.substr(prefix.size()));
+        return {std::istream_iterator<std::string>(words), {}};
+    }
+    throw InputError("the session does not say which lamps it was begun with", "capture a new session");
+}
+
+void check_same_rig(const SessionWriter& writer, const RigDescription& rig) {
+    const fs::path file = writer.folder() / "data" / rig_file;
+    std::ifstream in(file, std::ios::binary);
+    const std::string stored(std::istreambuf_iterator<char>(in), {});
+    if (stored != rig.toml)
+        throw InputError(fmt::format("session {} was begun with another rig.toml", writer.folder().string()),
+                         fmt::format("resume it with {}, or capture a new session", file.string()));
+}
+
+void check_same_lamps(const CapturePlan& asked, const CapturePlan& begun, const RigDescription& rig) {
+    if (lamps_of(asked, rig) != lamps_of(begun, rig))
+        throw InputError(
+            "the session was begun with other lamps",
+            fmt::format("resume it without naming lamps; its lamps are: {}", fmt::join(lamps_of(begun, rig), ", ")));
+}
+
+/// A session, open for writing, and what it is to hold.
+struct Begun {
+    SessionWriter writer;
+    CapturePlan plan;
+};
+
+void keep_rig(SessionWriter& writer, const RigDescription& rig) {
+    writer.add_extra(rig_file, std::as_bytes(std::span(rig.toml)));
+}
+
+Begun create(const CaptureRequest& request, const RigDescription& rig, Camera& camera) {
+    CapturePlan plan = plan_capture(rig, request.lamps);
+    const CameraInfo info = camera.configure(plan.shots.front().camera);
+    SessionWriter writer = SessionWriter::create(request.folder, session_info(rig, info, request.object, plan));
+    keep_rig(writer, rig);
+    return {std::move(writer), std::move(plan)};
+}
+
+Begun resume(const CaptureRequest& request, const RigDescription& rig) {
+    SessionWriter writer = SessionWriter::resume(request.folder);
+    // A run killed before its first frame may have died before rig.toml was kept, too.
+    if (writer.acknowledged().empty() && !fs::exists(writer.folder() / "data" / rig_file)) keep_rig(writer, rig);
+    check_same_rig(writer, rig);
+    CapturePlan plan = plan_capture(rig, lamps_of(writer.info()));
+    if (!request.lamps.empty()) check_same_lamps(plan_capture(rig, request.lamps), plan, rig);
+    writer.note_event(fmt::format("resumed with {} of {} frames", writer.acknowledged().size(), plan.shots.size()));
+    return {std::move(writer), std::move(plan)};
+}
+
+}  // namespace
+
+SessionInfo session_info(const RigDescription& rig, const CameraInfo& camera, const std::string& object,
+                         const CapturePlan& plan) {
+    SessionInfo info;
+    info.object = object;
+    info.created = iso8601_now();
+    info.source = "capture";
+    info.rig = rig.name;
+    info.camera = camera.id.empty() ? camera.model : fmt::format("{} ({})", camera.model, camera.id);
+    info.planned_shots = static_cast<int>(plan.shots.size());
+    info.notes.push_back(lamps_note + fmt::format("{}", fmt::join(lamps_of(plan, rig), " ")));
+    return info;
+}
+
+Session capture_session(const CaptureRequest& request, const RigDescription& rig, LampArray& lamps, Camera& camera,
+                        Clock& clock, const WorkContext& work) {
+    const DarkOnExit dark_on_exit(lamps);
+    Begun begun = request.start == CaptureStart::create ? create(request, rig, camera) : resume(request, rig);
+    run_capture(begun.plan, rig, lamps, camera, clock, begun.writer, work);
+    return begun.writer.seal();
+}
+
+}  // namespace darkbox

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "rig/capture/capture_run.h"
+
+namespace darkbox {
+
+enum class CaptureStart {
+    create,  ///< a new session in an absent or empty folder
+    resume,  ///< goes on with an interrupted one
+};
+
+struct CaptureRequest {
+    std::filesystem::path folder;    ///< of the session
+    std::string object;              ///< name given by the user; a resumed session keeps its own
+    std::vector<std::string> lamps;  ///< names; empty = all, or the interrupted session's own
+    CaptureStart start = CaptureStart::create;
+};
+
+/// The head of a session of this plan, created now.
+SessionInfo session_info(const RigDescription& rig, const CameraInfo& camera, const std::string& object,
+                         const CapturePlan& plan);
+
+/// The whole capture: starts or resumes the session, keeps rig.toml in it, takes every shot, seals. Lamps are dark when
+/// it returns or throws; whatever was acknowledged stays and can be resumed. Throws what run_capture() throws, and
+/// InputError when an interrupted session was begun with another rig.toml or other lamps.
+Session capture_session(const CaptureRequest& request, const RigDescription& rig, LampArray& lamps, Camera& camera,
+                        Clock& clock, const WorkContext& work = {});
+
+}  // namespace darkbox

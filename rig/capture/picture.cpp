@@ -1,0 +1,145 @@
+#include "rig/capture/picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <numeric>
+
+namespace darkbox {
+namespace {
+
+constexpr double wanted_blocks = 300;  ///< enough for a steady mean of their ratios
+constexpr int largest_block = 16;      ///< samples a side
+
+/// Sum over a block of the difference, and of the variance that noise gives it.
+struct BlockSums {
+    double difference = 0.0;
+    double variance = 0.0;
+};
+
+/// Adds up a NoiseRatio. The square of a normal deviate has twice its variance's square as its own variance.
+struct RatioSums {
+    double squared = 0.0;
+    double variance = 0.0;
+    double variance_squared = 0.0;
+
+    void add(double difference, double its_variance) {
+        squared += difference * difference;
+        variance += its_variance;
+        variance_squared += its_variance * its_variance;
+    }
+    NoiseRatio ratio() const { return {squared / variance, std::sqrt(2 * variance_squared) / variance}; }
+};
+
+int block_side(const Picture& picture) {
+    const double area = static_cast<double>(picture.columns) * picture.rows;
+    return std::clamp(static_cast<int>(std::sqrt(area / wanted_blocks)), 1, largest_block);
+}
+
+std::size_t at(const Picture& picture, int row, int column) {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(picture.columns) + static_cast<std::size_t>(column);
+}
+
+}  // namespace
+
+Picture to_picture(const Frame& frame) {
+    Picture picture{frame.width * channels(frame.format), frame.height, {}};
+    const std::size_t count = static_cast<std::size_t>(picture.columns) * static_cast<std::size_t>(picture.rows);
+    picture.samples.resize(count);
+    if (bytes_per_sample(frame.format) == 2) {
+        std::memcpy(picture.samples.data(), frame.pixels.data(), count * 2);
+    } else {
+        std::transform(frame.pixels.begin(), frame.pixels.begin() + static_cast<std::ptrdiff_t>(count),
+                       picture.samples.begin(), [](std::byte b) { return std::to_integer<std::uint16_t>(b); });
+    }
+    return picture;
+}
+
+double mean(const Picture& picture) {
+    const auto sum = std::accumulate(picture.samples.begin(), picture.samples.end(), std::uint64_t{0});
+    return static_cast<double>(sum) / static_cast<double>(std::max<std::size_t>(picture.samples.size(), 1));
+}
+
+Picture shrink(const Picture& picture) {
+    const int side = block_side(picture);
+    Picture small{picture.columns / side, picture.rows / side, {}};
+    for (int row = 0; row < small.rows; ++row) {
+        for (int column = 0; column < small.columns; ++column) {
+            std::uint64_t sum = 0;
+            for (int y = 0; y < side; ++y)
+                for (int x = 0; x < side; ++x) sum += picture.samples[at(picture, row * side + y, column * side + x)];
+            small.samples.push_back(static_cast<std::uint16_t>(sum / static_cast<std::uint64_t>(side * side)));
+        }
+    }
+    return small;
+}
+
+NoiseModel measure_noise(const Picture& a, const Picture& b, const Picture& dark, double full_scale) {
+    const double dark_mean = mean(dark);
+    const double gain = (mean(a) - dark_mean) / (mean(b) - dark_mean);
+    // A straight line through (signal, variance), by least squares over all samples.
+    double n = 0, sum_s = 0, sum_v = 0, sum_ss = 0, sum_sv = 0;
+    for (std::size_t i = 0; i < a.samples.size(); ++i) {
+        if (a.samples[i] >= full_scale || b.samples[i] >= full_scale) continue;
+        const double signal_a = static_cast<double>(a.samples[i]) - dark.samples[i];
+        const double signal_b = gain * (static_cast<double>(b.samples[i]) - dark.samples[i]);
+        const double signal = (signal_a + signal_b) / 2;
+        const double variance = (signal_a - signal_b) * (signal_a - signal_b) / (1 + gain * gain);
+        n += 1;
+        sum_s += signal;
+        sum_v += variance;
+        sum_ss += signal * signal;
+        sum_sv += signal * variance;
+    }
+    NoiseModel noise;
+    if (n == 0) return noise;
+    const double spread = sum_ss - sum_s * sum_s / n;
+    noise.slope = spread > 0 ? std::max(0.0, (sum_sv - sum_s * sum_v / n) / spread) : 0.0;
+    noise.floor = std::max(noise.floor, (sum_v - noise.slope * sum_s) / n);
+    return noise;
+}
+
+Difference compare(const Picture& a, const Picture& b, const Picture& dark, const NoiseModel& noise) {
+    Difference result;
+    const double dark_mean = mean(dark);
+    result.gain = (mean(a) - dark_mean) / (mean(b) - dark_mean);
+    const int side = block_side(a);
+    const int across = (a.columns + side - 1) / side;
+    std::vector<BlockSums> blocks(static_cast<std::size_t>(across) *
+                                  static_cast<std::size_t>((a.rows + side - 1) / side));
+    RatioSums pixels;
+    for (int row = 0; row < a.rows; ++row) {
+        for (int column = 0; column < a.columns; ++column) {
+            const std::size_t i = at(a, row, column);
+            const double signal_a = static_cast<double>(a.samples[i]) - dark.samples[i];
+            const double signal_b = result.gain * (static_cast<double>(b.samples[i]) - dark.samples[i]);
+            const double difference = signal_a - signal_b;
+            const double variance = noise.variance((signal_a + signal_b) / 2) * (1 + result.gain * result.gain);
+            BlockSums& block = blocks[static_cast<std::size_t>(row / side) * static_cast<std::size_t>(across) +
+                                      static_cast<std::size_t>(column / side)];
+            block.difference += difference;
+            block.variance += variance;
+            pixels.add(difference, variance);
+        }
+    }
+    RatioSums sums;
+    for (const BlockSums& block : blocks) sums.add(block.difference, block.variance);
+    result.pixels = pixels.ratio();
+    result.blocks = sums.ratio();
+    return result;
+}
+
+double correlation(const Picture& lit, const Picture& brightened_dark, const Picture& dark) {
+    double aa = 0, bb = 0, ab = 0;
+    for (std::size_t i = 0; i < lit.samples.size(); ++i) {
+        const double a = static_cast<double>(lit.samples[i]) - dark.samples[i];
+        const double b = static_cast<double>(brightened_dark.samples[i]) - dark.samples[i];
+        aa += a * a;
+        bb += b * b;
+        ab += a * b;
+    }
+    return aa > 0 && bb > 0 ? ab / std::sqrt(aa * bb) : 0.0;
+}
+
+}  // namespace darkbox
