@@ -1,0 +1,67 @@
+#include "sim/faults.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <regex>
+#include <sstream>
+#include <string_view>
+
+#include "acquisition/frame/error.h"
+
+namespace darkbox::sim {
+namespace {
+
+struct Row {
+    FaultKind kind;
+    std::string_view name;
+    int lamps;
+};
+constexpr std::array rows{Row{FaultKind::drop, "drop", 0},
+                          Row{FaultKind::error_flag, "error-flag", 0},
+                          Row{FaultKind::repeat, "repeat", 0},
+                          Row{FaultKind::stale_queue, "stale-queue", 0},
+                          Row{FaultKind::black_frame, "black-frame", 0},
+                          Row{FaultKind::hang, "hang", 0},
+                          Row{FaultKind::dead_lamp, "dead-lamp", 1},
+                          Row{FaultKind::stuck_lamp, "stuck-lamp", 1},
+                          Row{FaultKind::swapped_lamps, "swapped-lamps", 2}};
+
+[[noreturn]] void throw_bad_fault(const std::string& word) {
+    std::string names;
+    for (const Row& row : rows) names += fmt::format("{}{}", names.empty() ? "" : ", ", row.name);
+    throw InputError(
+        fmt::format("cannot read the simulated fault '{}'", word),
+        fmt::format("write NAME@MOMENT, NAME@MOMENTxCOUNT or, for lamps, NAME@MOMENT:LAMP[,LAMP]; names: {}", names));
+}
+
+Fault parse_fault(const std::string& word) {
+    static const std::regex form(R"(([a-z-]+)@(\d{1,9})(?:x(\d{1,9}))?(?::(\d{1,4})(?:,(\d{1,4}))?)?)");
+    std::smatch part;
+    if (!std::regex_match(word, part, form)) throw_bad_fault(word);
+    const auto row = std::find_if(rows.begin(), rows.end(), [&](const Row& r) { return r.name == part[1].str(); });
+    const int lamps = part[5].matched ? 2 : part[4].matched ? 1 : 0;
+    if (row == rows.end() || row->lamps != lamps) throw_bad_fault(word);
+    Fault fault{row->kind, std::stoull(part[2]), part[3].matched ? std::stoull(part[3]) : 1, {}, {}};
+    if (lamps > 0) fault.lamp.value = static_cast<std::uint32_t>(std::stoul(part[4]));
+    if (lamps > 1) fault.other.value = static_cast<std::uint32_t>(std::stoul(part[5]));
+    return fault;
+}
+
+}  // namespace
+
+bool FaultPlan::hits(FaultKind kind, std::uint64_t sequence) const {
+    return std::any_of(faults.begin(), faults.end(), [&](const Fault& fault) {
+        return fault.kind == kind && fault.at <= sequence && sequence < fault.at + fault.count;
+    });
+}
+
+FaultPlan parse_faults(const std::string& text) {
+    FaultPlan plan;
+    std::istringstream words(text);
+    for (std::string word; words >> word;) plan.faults.push_back(parse_fault(word));
+    return plan;
+}
+
+}  // namespace darkbox::sim

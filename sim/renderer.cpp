@@ -1,0 +1,205 @@
+#include "sim/renderer.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "sim/noise.h"
+
+namespace darkbox::sim {
+
+struct Renderer::Fragment {
+    Vec3 position;
+    Vec3 geometric_normal;
+    Vec3 normal;
+    Vec3 to_viewer;
+    Rgb albedo;
+    double specular = 0.0;
+    double exponent = 1.0;
+};
+
+struct Renderer::Sample {
+    struct Reflection {
+        Ray ray;
+        double distance_mm = 0.0;  ///< to the solid thing it meets; infinite when that is the box
+        Fragment seen;
+    };
+    Fragment seen;
+    bool shows_object = false;
+    std::optional<Reflection> reflection;
+};
+
+namespace {
+
+/// Shadow rays start this far off the surface: more than a tessellated surface lies beneath the true one.
+constexpr double shadow_offset_mm = 0.05;
+
+/// The places of the rays within a pixel, relative to its centre.
+constexpr std::array<double, rays_per_pixel_side> ray_offsets = [] {
+    std::array<double, rays_per_pixel_side> offsets{};
+    for (int i = 0; i < rays_per_pixel_side; ++i) offsets[i] = (i + 0.5) / rays_per_pixel_side - 0.5;
+    return offsets;
+}();
+
+/// Calls f(u, v) for the rays of pixel (column, row), always in the same order.
+template <class F>
+void for_each_ray(int column, int row, const F& f) {
+    for (const double dv : ray_offsets)
+        for (const double du : ray_offsets) f(column + du, row + dv);
+}
+
+template <class F>
+void for_each_row(int rows, const F& f) {
+    tbb::parallel_for(tbb::blocked_range<int>(0, rows), [&](const tbb::blocked_range<int>& range) {
+        for (int row = range.begin(); row < range.end(); ++row) f(row);
+    });
+}
+
+}  // namespace
+
+Renderer::Fragment Renderer::box_fragment(const Ray& ray) const {
+    const Box& box = scene_.box;
+    struct Wall {
+        Vec3 normal;  // into the box
+        double offset;
+        const Rgb* albedo;
+    };
+    const std::array<Wall, 6> walls{{{{0, 0, 1}, box.backdrop_z_mm, &box.backdrop},
+                                     {{0, 0, -1}, -box.front_z_mm, &box.walls},
+                                     {{1, 0, 0}, -box.half_width_mm, &box.walls},
+                                     {{-1, 0, 0}, -box.half_width_mm, &box.walls},
+                                     {{0, 1, 0}, -box.half_width_mm, &box.walls},
+                                     {{0, -1, 0}, -box.half_width_mm, &box.walls}}};
+    const Wall* nearest = nullptr;
+    double distance = std::numeric_limits<double>::infinity();
+    for (const Wall& wall : walls) {
+        const double approach = -dot(ray.direction, wall.normal);
+        if (approach <= 0.0) continue;
+        const double t = (dot(ray.origin, wall.normal) - wall.offset) / approach;
+        if (t < distance) {
+            distance = t;
+            nearest = &wall;
+        }
+    }
+    return {ray.origin + ray.direction * distance, nearest->normal, nearest->normal, -ray.direction, *nearest->albedo};
+}
+
+Renderer::Fragment Renderer::fragment(const Ray& ray, const std::optional<RayHit>& hit) const {
+    if (!hit) return box_fragment(ray);
+    Fragment seen{hit->point.position, hit->geometric_normal, hit->normal, -ray.direction, {}};
+    if (hit->on_ball) {
+        seen.albedo = scene_.ball->body;
+        return seen;
+    }
+    const Material& material = *hit->material;
+    seen.albedo = material.texture->albedo(hit->point);
+    seen.normal = normal_with_relief(*material.texture, hit->point, hit->normal);
+    seen.specular = material.specular;
+    seen.exponent = material.exponent;
+    return seen;
+}
+
+Renderer::Sample Renderer::sample(const Ray& ray) const {
+    const auto hit = tracer_.first_hit(ray);
+    Sample result{fragment(ray, hit), hit && !hit->on_ball, std::nullopt};
+    if (hit && hit->on_ball) {
+        const Ray onward{hit->point.position + hit->normal * shadow_offset_mm, mirrored(ray.direction, hit->normal)};
+        const auto next = tracer_.first_hit(onward);
+        result.reflection = {onward, next ? next->distance_mm : std::numeric_limits<double>::infinity(),
+                             fragment(onward, next)};
+    }
+    return result;
+}
+
+Rgb Renderer::radiance(const Fragment& f, const SceneLamp& lamp) const {
+    const Incidence light = incidence(scene_, lamp, f.position);
+    const double cosine = dot(f.normal, light.direction);
+    if (cosine <= 0.0) return {};
+    if (tracer_.blocked({f.position + f.geometric_normal * shadow_offset_mm, light.direction}, light.distance_mm))
+        return {};
+    Rgb reflected = f.albedo * cosine;
+    if (f.specular > 0.0) {
+        const double along_mirror = dot(mirrored(-light.direction, f.normal), f.to_viewer);
+        if (along_mirror > 0.0) reflected += Rgb{1, 1, 1} * (f.specular * std::pow(along_mirror, f.exponent));
+    }
+    return reflected * light.irradiance;
+}
+
+/// A lamp of angular radius a that gives irradiance E has radiance E / (pi a^2); in units where a white matt surface
+/// has radiance E that is E / a^2. Frosted glass has a soft rim, which also keeps the highlight's outline smooth.
+Rgb Renderer::glow(const Ray& ray, const SceneLamp& lamp, double distance_to_solid_mm) const {
+    const Incidence light = incidence(scene_, lamp, ray.origin);
+    if (distance_to_solid_mm < light.distance_mm) return {};
+    const double distance = std::min(light.distance_mm, length(lamp.position));
+    const double angular_radius = lamp.radius_mm / distance;
+    const double angle = 2.0 * std::asin(std::min(1.0, 0.5 * length(ray.direction - light.direction)));
+    const double inside = 1.0 - smooth_step(0.75 * angular_radius, 1.25 * angular_radius, angle);
+    return light.irradiance * (inside / (angular_radius * angular_radius));
+}
+
+Rgb Renderer::radiance(const Sample& s, const SceneLamp& lamp) const {
+    Rgb sum = radiance(s.seen, lamp);
+    if (s.reflection) {
+        const auto& r = *s.reflection;
+        sum += (radiance(r.seen, lamp) + glow(r.ray, lamp, r.distance_mm)) * scene_.ball->reflectance;
+    }
+    return sum;
+}
+
+std::vector<RgbImage> Renderer::render(std::span<const LampId> lamps) const {
+    const View& view = scene_.view;
+    std::vector<RgbImage> pictures(lamps.size(), RgbImage(view.width, view.height));
+    constexpr double share = 1.0 / (rays_per_pixel_side * rays_per_pixel_side);
+    for_each_row(view.height, [&](int row) {
+        std::vector<Rgb> sums(lamps.size());
+        for (int column = 0; column < view.width; ++column) {
+            std::fill(sums.begin(), sums.end(), Rgb{});
+            for_each_ray(column, row, [&](double u, double v) {
+                const Sample seen = sample(camera_ray(view, u, v));
+                for (std::size_t i = 0; i < lamps.size(); ++i)
+                    sums[i] += radiance(seen, scene_.lamps.at(lamps[i].value));
+            });
+            for (std::size_t i = 0; i < lamps.size(); ++i) pictures[i].set(column, row, sums[i] * share);
+        }
+    });
+    return pictures;
+}
+
+SceneTruth Renderer::truth() const {
+    const View& view = scene_.view;
+    SceneTruth truth{RgbImage(view.width, view.height), RgbImage(view.width, view.height),
+                     std::vector<char>(static_cast<std::size_t>(view.width) * view.height, 0)};
+    for_each_row(view.height, [&](int row) {
+        for (int column = 0; column < view.width; ++column) {
+            const Sample centre = sample(camera_ray(view, column, row));
+            if (!centre.shows_object) continue;
+            const Vec3& n = centre.seen.normal;
+            truth.mask[static_cast<std::size_t>(row) * view.width + column] = 1;
+            truth.normals.set(column, row, {n.x, n.y, n.z});
+            Rgb sum;
+            int count = 0;
+            for_each_ray(column, row, [&](double u, double v) {
+                const Sample seen = sample(camera_ray(view, u, v));
+                if (!seen.shows_object) return;
+                sum += seen.seen.albedo;
+                ++count;
+            });
+            truth.albedo.set(column, row, count > 0 ? sum * (1.0 / count) : centre.seen.albedo);
+        }
+    });
+    return truth;
+}
+
+RgbImage render_radiance(const Scene& scene, std::optional<LampId> lamp) {
+    if (!lamp) return {scene.view.width, scene.view.height};
+    return std::move(Renderer(scene).render(std::array{*lamp}).front());
+}
+
+SceneTruth render_truth(const Scene& scene) { return Renderer(scene).truth(); }
+
+}  // namespace darkbox::sim

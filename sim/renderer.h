@@ -1,0 +1,56 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "acquisition/frame/ids.h"
+#include "sim/image.h"
+#include "sim/ray_tracer.h"
+#include "sim/scene.h"
+
+namespace darkbox::sim {
+
+/// Side of the regular grid of rays in every pixel.
+constexpr int rays_per_pixel_side = 4;
+
+/// What is true of the object at each pixel. Background: normal and albedo 0.
+struct SceneTruth {
+    RgbImage normals;        ///< viewer frame, relief included, at the pixel's centre
+    RgbImage albedo;         ///< mean over the part of the pixel that the object covers
+    std::vector<char> mask;  ///< 1 where the pixel's centre shows the object
+};
+
+/// Traces rays from the camera: direct light with shadows, and one reflection on the mirror ball. Interreflection on
+/// the object is left out, so that Lambert's and Phong's laws hold exactly. Refers to the scene. The same bits on any
+/// number of threads; const members are thread-safe.
+class Renderer {
+public:
+    explicit Renderer(const Scene& scene) : scene_(scene), tracer_(scene) {}
+
+    /// One picture for each of these lamps, burning alone at full level: radiance, linear.
+    std::vector<RgbImage> render(std::span<const LampId> lamps) const;
+    SceneTruth truth() const;
+
+private:
+    /// A visible point, ready to be lit.
+    struct Fragment;
+    /// What one ray from the camera sees: a point, and behind the ball's gloss what it mirrors.
+    struct Sample;
+
+    Sample sample(const Ray& ray) const;
+    Fragment fragment(const Ray& ray, const std::optional<RayHit>& hit) const;
+    Fragment box_fragment(const Ray& ray) const;
+    Rgb radiance(const Sample& sample, const SceneLamp& lamp) const;
+    Rgb radiance(const Fragment& fragment, const SceneLamp& lamp) const;
+    Rgb glow(const Ray& mirrored_ray, const SceneLamp& lamp, double distance_to_solid_mm) const;
+
+    const Scene& scene_;
+    RayTracer tracer_;
+};
+
+/// The picture with one lamp burning, or none: black.
+RgbImage render_radiance(const Scene& scene, std::optional<LampId> lamp);
+SceneTruth render_truth(const Scene& scene);
+
+}  // namespace darkbox::sim

@@ -1,0 +1,197 @@
+#include "sim/sim_camera.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+#include <stdexcept>
+#include <utility>
+
+#include "acquisition/device/device_error.h"
+
+namespace darkbox::sim {
+namespace {
+
+constexpr FrameControls power_on_controls{Seconds{0.02}, 1.0};
+
+PixelFormat format_of(const Sensor& sensor) { return sensor.bit_depth > 8 ? PixelFormat::rgb16 : PixelFormat::rgb8; }
+
+std::vector<std::byte> as_bytes(const std::vector<std::uint16_t>& samples, PixelFormat format) {
+    std::vector<std::byte> bytes;
+    bytes.reserve(samples.size() * static_cast<std::size_t>(bytes_per_sample(format)));
+    for (const std::uint16_t sample : samples) {
+        bytes.push_back(static_cast<std::byte>(sample & 0xFFU));
+        if (format == PixelFormat::rgb16) bytes.push_back(static_cast<std::byte>(sample >> 8U));
+    }
+    return bytes;
+}
+
+/// What a broken transfer leaves: the lower half is the upper half's bytes out of place.
+void damage(std::vector<std::byte>& bytes) {
+    const auto half = static_cast<std::ptrdiff_t>(bytes.size() / 2);
+    std::rotate_copy(bytes.begin(), bytes.begin() + half / 3, bytes.begin() + half, bytes.begin() + half);
+}
+
+}  // namespace
+
+SimCamera::SimCamera(const Scene& scene, const SimLamps& lamps, SimClock& clock, SimCameraOptions options)
+    : scene_(scene),
+      lamps_(lamps),
+      clock_(clock),
+      options_(std::move(options)),
+      controls_(power_on_controls),
+      controls_before_(power_on_controls),
+      waits_hung_(options_.faults.faults.size(), 0) {}
+
+SimCamera::~SimCamera() = default;
+
+CameraInfo SimCamera::configure(const CameraConfig& config) {
+    if (state_ == State::streaming) throw std::logic_error("SimCamera::configure while streaming");
+    if (!(config.exposure.count() > 0.0) || !(config.gain > 0.0))
+        throw DeviceError(
+            fmt::format("the simulated camera cannot expose for {} s at gain {}", config.exposure.count(), config.gain),
+            "exposure and gain must be positive");
+    state_ = State::ready;
+    controls_before_ = controls_;
+    controls_ = {config.exposure, config.gain};
+
+    CameraInfo info;
+    info.model = "darkbox simulated camera";
+    info.id = "sim:" + scene_.name;
+    info.width = scene_.view.width;
+    info.height = scene_.view.height;
+    info.format = format_of(options_.sensor);
+    info.bit_depth = options_.sensor.bit_depth;
+    info.black_level = options_.sensor.black_level;
+    info.frame_period = std::max({options_.shortest_period, controls_.exposure + options_.readout,
+                                  controls_before_.exposure + options_.readout});
+    info.queue_depth = options_.queue_depth;
+    info.latency_frames = options_.latency_frames;
+    info.controls = controls_;
+    period_ = to_nanoseconds(info.frame_period);
+    return info;
+}
+
+void SimCamera::start() {
+    if (state_ != State::ready) throw std::logic_error("SimCamera::start in a state other than ready");
+    state_ = State::streaming;
+    stream_start_ = clock_.now();
+    first_sequence_ = next_sequence_;
+    queue_.clear();
+}
+
+void SimCamera::stop() {
+    if (state_ != State::streaming) return;
+    state_ = State::ready;
+    queue_.clear();
+    if (next_sequence_ >= first_sequence_ + static_cast<std::uint64_t>(options_.latency_frames))
+        controls_before_ = controls_;
+}
+
+SimCamera::Exposure SimCamera::exposure(std::uint64_t sequence) const {
+    const std::uint64_t place = sequence - first_sequence_;
+    const bool settled = place >= static_cast<std::uint64_t>(options_.latency_frames);
+    Exposure e{sequence, settled ? controls_ : controls_before_, {}};
+    e.interval.begin = stream_start_ + period_ * static_cast<Nanoseconds::rep>(place);
+    e.interval.end = e.interval.begin + to_nanoseconds(e.controls.exposure);
+    return e;
+}
+
+void SimCamera::fill_queue() {
+    for (;; ++next_sequence_) {
+        const Exposure e = exposure(next_sequence_);
+        if (finished(e) > clock_.now()) return;
+        const bool lost = options_.faults.hits(FaultKind::drop, e.sequence);
+        if (!lost && queue_.size() < static_cast<std::size_t>(options_.queue_depth)) queue_.push_back(e);
+    }
+}
+
+bool SimCamera::hangs() {
+    const auto& faults = options_.faults.faults;
+    const std::uint64_t sequence = queue_.empty() ? next_sequence_ : queue_.front().sequence;
+    for (std::size_t i = 0; i < faults.size(); ++i)
+        if (faults[i].kind == FaultKind::hang && sequence >= faults[i].at && waits_hung_[i] < faults[i].count) {
+            ++waits_hung_[i];
+            return true;
+        }
+    return false;
+}
+
+void SimCamera::wait_for_frame(TimePoint deadline) {
+    fill_queue();
+    const bool hung = hangs();
+    while (hung || queue_.empty()) {
+        const TimePoint moment = hung ? TimePoint::max() : finished(exposure(next_sequence_));
+        if (moment > deadline) {
+            clock_.sleep_until(deadline);
+            throw DeadlineError("the simulated camera gave no frame before the deadline",
+                                "allow at least one frame period, or restart the camera");
+        }
+        clock_.sleep_until(moment);
+        fill_queue();
+    }
+}
+
+Frame SimCamera::next_frame(TimePoint deadline) {
+    if (state_ != State::streaming) throw std::logic_error("SimCamera::next_frame while not streaming");
+    wait_for_frame(deadline);
+    Exposure oldest = queue_.front();
+    queue_.pop_front();
+    if (options_.faults.hits(FaultKind::stale_queue, oldest.sequence))
+        oldest = earlier(oldest, static_cast<std::uint64_t>(options_.queue_depth) + 1);
+    return deliver(oldest);
+}
+
+SimCamera::Exposure SimCamera::earlier(const Exposure& e, std::uint64_t frames) const {
+    return exposure(e.sequence - std::min(frames, e.sequence - first_sequence_));
+}
+
+Frame SimCamera::deliver(const Exposure& e) {
+    const FaultPlan& faults = options_.faults;
+    const Exposure picture = faults.hits(FaultKind::repeat, e.sequence) ? earlier(e, 1) : e;
+    const bool black = faults.hits(FaultKind::black_frame, e.sequence);
+    const auto burning = black ? std::vector<LampShare>{} : lamps_.burning_during(picture.interval);
+    exposures_.push_back({e.sequence, e.interval.begin, burning});
+
+    const Sensor& sensor = options_.sensor;
+    Frame frame;
+    frame.width = scene_.view.width;
+    frame.height = scene_.view.height;
+    frame.format = format_of(sensor);
+    frame.bit_depth = sensor.bit_depth;
+    frame.black_level = sensor.black_level;
+    frame.pixels = as_bytes(
+        expose(sensor, light_of(burning), {picture.controls.exposure.count(), picture.controls.gain, picture.sequence}),
+        frame.format);
+    frame.sequence = e.sequence;
+    frame.timestamp = e.interval.begin;
+    frame.exposure = e.interval;
+    frame.controls = e.controls;
+    if (faults.hits(FaultKind::error_flag, e.sequence)) {
+        frame.status = FrameStatus::error;
+        damage(frame.pixels);
+    }
+    return frame;
+}
+
+RgbImage SimCamera::light_of(const std::vector<LampShare>& burning) {
+    RgbImage sum(scene_.view.width, scene_.view.height);
+    for (const LampShare& b : burning) {
+        const RgbImage& picture = picture_of(b.lamp);
+        const auto share = static_cast<float>(b.share);
+        for (std::size_t i = 0; i < sum.samples.size(); ++i) sum.samples[i] += share * picture.samples[i];
+    }
+    return sum;
+}
+
+const RgbImage& SimCamera::picture_of(LampId lamp) {
+    if (pictures_.empty()) {
+        // All at once: the rays from the camera are then traced once, not once for each lamp.
+        std::vector<LampId> all(scene_.lamps.size());
+        for (std::size_t i = 0; i < all.size(); ++i) all[i].value = static_cast<std::uint32_t>(i);
+        pictures_ = Renderer(scene_).render(all);
+    }
+    return pictures_.at(lamp.value);
+}
+
+}  // namespace darkbox::sim

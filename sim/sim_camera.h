@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <vector>
+
+#include "acquisition/camera/camera.h"
+#include "sim/faults.h"
+#include "sim/renderer.h"
+#include "sim/sensor.h"
+#include "sim/sim_clock.h"
+#include "sim/sim_lamps.h"
+
+namespace darkbox::sim {
+
+struct SimCameraOptions {
+    Sensor sensor;
+    int latency_frames = 1;  ///< exposures after start() that still have the controls from before configure()
+    int queue_depth = 2;     ///< finished frames that wait; while the queue is full new ones are lost
+    Seconds shortest_period{1.0 / 30};
+    Seconds readout{0.004};  ///< from the end of the exposure to the finished frame
+    FaultPlan faults;
+};
+
+/// Which lamps really lit a delivered picture, and how much.
+struct ExposureTruth {
+    std::uint64_t sequence = 0;
+    TimePoint timestamp;
+    std::vector<LampShare> lamps;
+};
+
+/// A free-running camera with a global shutter that sees the scene in the light that the lamps really gave during each
+/// exposure. Timestamps are the start of the exposure; sequences go on counting over stop() and start().
+/// Refers to scene, lamps and clock. Configuring again is allowed while not streaming. Thread-compatible.
+class SimCamera final : public Camera {
+public:
+    SimCamera(const Scene& scene, const SimLamps& lamps, SimClock& clock, SimCameraOptions options);
+    ~SimCamera() override;
+
+    CameraInfo configure(const CameraConfig& config) override;
+    void start() override;
+    Frame next_frame(TimePoint deadline) override;
+    void stop() override;
+
+    /// One entry for each frame delivered.
+    const std::vector<ExposureTruth>& exposures() const { return exposures_; }
+
+private:
+    enum class State { closed, ready, streaming };
+    /// A picture that was, or is being, exposed.
+    struct Exposure {
+        std::uint64_t sequence = 0;
+        FrameControls controls;
+        Interval interval;
+    };
+
+    Exposure exposure(std::uint64_t sequence) const;
+    Exposure earlier(const Exposure& e, std::uint64_t frames) const;
+    TimePoint finished(const Exposure& e) const { return e.interval.end + to_nanoseconds(options_.readout); }
+    void fill_queue();
+    void wait_for_frame(TimePoint deadline);
+    bool hangs();
+    Frame deliver(const Exposure& e);
+    RgbImage light_of(const std::vector<LampShare>& burning);
+    const RgbImage& picture_of(LampId lamp);
+
+    const Scene& scene_;
+    const SimLamps& lamps_;
+    SimClock& clock_;
+    SimCameraOptions options_;
+    State state_ = State::closed;
+    FrameControls controls_;         ///< asked for
+    FrameControls controls_before_;  ///< in effect for the first frames after start()
+    Nanoseconds period_{0};
+    TimePoint stream_start_;
+    std::uint64_t first_sequence_ = 0;  ///< of this stream
+    std::uint64_t next_sequence_ = 0;   ///< to be exposed
+    std::deque<Exposure> queue_;
+    std::vector<std::uint64_t> waits_hung_;  ///< for each fault of the plan
+    std::vector<RgbImage> pictures_;         ///< one for each lamp, made when the first is needed
+    std::vector<ExposureTruth> exposures_;
+};
+
+}  // namespace darkbox::sim

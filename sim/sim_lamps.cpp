@@ -1,0 +1,72 @@
+#include "sim/sim_lamps.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <utility>
+
+#include "acquisition/device/device_error.h"
+
+namespace darkbox::sim {
+namespace {
+
+/// The call before the first: what burns of its own from the start.
+constexpr std::uint64_t before_any_call = 0;
+
+}  // namespace
+
+SimLamps::SimLamps(std::size_t count, const SimClock& clock, FaultPlan faults)
+    : count_(count), clock_(clock), faults_(std::move(faults)) {
+    history_.push_back({clock_.now(), really_burning({}, before_any_call)});
+}
+
+SimLamps::~SimLamps() = default;
+
+void SimLamps::light(LampId lamp, double level) {
+    if (lamp.value >= count_)
+        throw DeviceError(fmt::format("lamp {} does not exist: the simulated rig has {}", lamp.value, count_),
+                          "number lamps from 0 in the order of rig.toml");
+    if (!(level > 0.0 && level <= 1.0))
+        throw DeviceError(fmt::format("lamp {}: level {} is not in (0, 1]", lamp.value, level),
+                          "use dark() to switch off");
+    command({{lamp, level}});
+}
+
+void SimLamps::dark() { command({}); }
+
+void SimLamps::command(std::vector<LampShare> commanded) {
+    history_.push_back({clock_.now(), really_burning(std::move(commanded), switches())});
+}
+
+std::vector<LampShare> SimLamps::really_burning(std::vector<LampShare> burning, std::uint64_t call) const {
+    for (const Fault& fault : faults_.faults) {
+        if (call < fault.at) continue;
+        if (fault.kind == FaultKind::dead_lamp)
+            std::erase_if(burning, [&](const LampShare& b) { return b.lamp == fault.lamp; });
+        if (fault.kind == FaultKind::stuck_lamp &&
+            std::none_of(burning.begin(), burning.end(), [&](const LampShare& b) { return b.lamp == fault.lamp; }))
+            burning.push_back({fault.lamp, 1.0});
+        if (fault.kind == FaultKind::swapped_lamps)
+            for (LampShare& b : burning)
+                b.lamp = b.lamp == fault.lamp ? fault.other : b.lamp == fault.other ? fault.lamp : b.lamp;
+    }
+    return burning;
+}
+
+std::vector<LampShare> SimLamps::burning_during(const Interval& interval) const {
+    std::map<LampId, double> seconds;
+    for (std::size_t i = 0; i < history_.size(); ++i) {
+        const TimePoint end = i + 1 < history_.size() ? history_[i + 1].when : interval.end;
+        const Nanoseconds overlap = std::min(end, interval.end) - std::max(history_[i].when, interval.begin);
+        if (overlap <= Nanoseconds(0)) continue;
+        for (const LampShare& b : history_[i].burning) seconds[b.lamp] += b.share * to_seconds(overlap);
+    }
+    std::vector<LampShare> shares;
+    const double whole = to_seconds(interval.end - interval.begin);
+    for (const auto& [lamp, lit] : seconds) shares.push_back({lamp, lit / whole});
+    return shares;
+}
+
+}  // namespace darkbox::sim

@@ -1,0 +1,59 @@
+#include "sim/sim_rig.h"
+
+#include <fmt/format.h>
+
+#include "acquisition/frame/error.h"
+#include "sim/scenes.h"
+#include "sim/truth.h"
+
+namespace darkbox::sim {
+namespace {
+
+void require(bool holds, std::string_view field, double value, std::string_view range) {
+    if (!holds) throw InputError(fmt::format("sim.{} is {}, but must be {}", field, value, range), "correct rig.toml");
+}
+
+void validate(const SimDescription& sim) {
+    require(sim.width >= 16 && sim.width <= 8192, "width", sim.width, "16 to 8192 pixels");
+    require(sim.height >= 16 && sim.height <= 8192, "height", sim.height, "16 to 8192 pixels");
+    require(sim.bit_depth >= 8 && sim.bit_depth <= 16, "bit_depth", sim.bit_depth, "8 to 16");
+    require(sim.full_well_e >= 100, "full_well_e", sim.full_well_e, "at least 100 electrons");
+    require(sim.read_noise_e >= 0, "read_noise_e", sim.read_noise_e, "0 or more electrons");
+    require(sim.latency_frames >= 0, "latency_frames", sim.latency_frames, "0 or more");
+    require(sim.queue_depth >= 1, "queue_depth", sim.queue_depth, "1 or more");
+}
+
+Sensor sensor_of(const SimDescription& sim) {
+    Sensor sensor;
+    sensor.bit_depth = sim.bit_depth;
+    sensor.black_level = static_cast<double>(1 << sim.bit_depth) / 64.0;
+    sensor.full_well_e = sim.full_well_e;
+    sensor.read_noise_e = sim.read_noise_e;
+    sensor.seed = sim.seed;
+    return sensor;
+}
+
+}  // namespace
+
+SimRig SimRig::make(const RigDescription& rig, const FaultPlan& faults) {
+    validate(rig.sim);
+    SimRig result;
+    result.scene_ =
+        std::make_unique<const Scene>(scene_by_name(rig.sim, rig.lamps, rig.ball_diameter_mm.value_or(36.0)));
+    result.clock_ =
+        std::make_unique<SimClock>(rig.sim.real_time ? SimClock::Pace::real_time : SimClock::Pace::virtual_time);
+    result.lamps_ = std::make_unique<SimLamps>(rig.lamps.size(), *result.clock_, faults);
+    SimCameraOptions options;
+    options.sensor = sensor_of(rig.sim);
+    options.latency_frames = rig.sim.latency_frames;
+    options.queue_depth = rig.sim.queue_depth;
+    options.faults = faults;
+    result.camera_ = std::make_unique<SimCamera>(*result.scene_, *result.lamps_, *result.clock_, options);
+    return result;
+}
+
+void SimRig::write_truth(const std::filesystem::path& folder) const {
+    sim::write_truth(*scene_, camera_->exposures(), folder);
+}
+
+}  // namespace darkbox::sim

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "rig/description/rig_description.h"
+#include "sim/faults.h"
+#include "sim/scene.h"
+#include "sim/sim_camera.h"
+#include "sim/sim_clock.h"
+#include "sim/sim_lamps.h"
+
+namespace darkbox::sim {
+
+/// The whole simulated rig: what a command or the daemon uses in place of devices. Move-only; the parts refer to each
+/// other and stay where they are. Thread-compatible; the clock is thread-safe.
+class SimRig {
+public:
+    /// The scene, sensor and lamps of the description. Throws InputError for an unknown scene or a value out of range.
+    /// The scene is rendered when the first lit frame is asked for.
+    static SimRig make(const RigDescription& rig, const FaultPlan& faults = {});
+
+    SimClock& clock() { return *clock_; }
+    SimLamps& lamps() { return *lamps_; }
+    SimCamera& camera() { return *camera_; }
+    const Scene& scene() const { return *scene_; }
+
+    /// Ground truth of the scene and of every frame delivered so far; see sim/truth.h for the files.
+    void write_truth(const std::filesystem::path& folder) const;
+
+private:
+    SimRig() = default;
+
+    std::unique_ptr<const Scene> scene_;
+    std::unique_ptr<SimClock> clock_;
+    std::unique_ptr<SimLamps> lamps_;
+    std::unique_ptr<SimCamera> camera_;
+};
+
+}  // namespace darkbox::sim
