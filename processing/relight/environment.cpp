@@ -70,9 +70,10 @@ cv::Vec3f normal_from_square(const cv::Vec2f& square) {
 
 float coordinate_of_node(int i) { return 2.0F * static_cast<float>(i) / cells - 1.0F; }
 
+/// The weight of each level for one normal.
 template <class Model>
-void fold_normal(const std::vector<DistantLight>& lights, const cv::Vec3f& normal, const Model& coefficient, int levels,
-                 cv::Vec3f* weights) {
+std::vector<cv::Vec3d> fold_normal(const std::vector<DistantLight>& lights, const cv::Vec3f& normal,
+                                   const Model& coefficient, int levels) {
     std::vector<cv::Vec3d> sums(levels, cv::Vec3d(0, 0, 0));
     for (const DistantLight& light : lights) {
         const float r = coefficient(normal, light.direction);
@@ -81,7 +82,7 @@ void fold_normal(const std::vector<DistantLight>& lights, const cv::Vec3f& norma
         sums[position.below] += cv::Vec3d(light.intensity) * (1.0 - position.fraction);
         sums[position.below + 1] += cv::Vec3d(light.intensity) * static_cast<double>(position.fraction);
     }
-    for (int level = 0; level < levels; ++level) weights[level] = sums[level];
+    return sums;
 }
 
 }  // namespace
@@ -104,43 +105,51 @@ std::vector<DistantLight> probe_lights(const Environment& environment, double ya
     return lights;
 }
 
-FoldedEnvironment::FoldedEnvironment(const std::vector<DistantLight>& lights, int levels, const RelightOptions& options)
-    : levels_(levels), weights_(static_cast<std::size_t>(nodes) * nodes * levels) {
+FoldedEnvironment::FoldedEnvironment(const std::vector<DistantLight>& lights, const ShadingMaps& maps,
+                                     const RelightOptions& options)
+    : levels_(maps.levels), weights_(static_cast<std::size_t>(nodes) * nodes * levels_) {
+    const auto colour = [](const auto& c) {
+        return Colour{static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), 0.0F};
+    };
     with_model(options, [&](const auto& coefficient) {
         tbb::parallel_for(0, nodes, [&](int row) {
             for (int column = 0; column < nodes; ++column) {
                 const cv::Vec2f square(coordinate_of_node(column), coordinate_of_node(row));
-                fold_normal(lights, normal_from_square(square), coefficient, levels_, node(row, column));
+                const auto weights = fold_normal(lights, normal_from_square(square), coefficient, levels_);
+                const std::size_t first = (static_cast<std::size_t>(row) * nodes + column) * levels_;
+                std::transform(weights.begin(), weights.end(), weights_.begin() + first, colour);
             }
         });
     });
+    shading_.reserve(static_cast<std::size_t>(maps.texels) * levels_);
+    for (const cv::Vec3f& value : maps.radiance) shading_.push_back(colour(value));
 }
 
-cv::Vec3f* FoldedEnvironment::node(int row, int column) {
+const FoldedEnvironment::Colour* FoldedEnvironment::node(int row, int column) const {
     return &weights_[(static_cast<std::size_t>(row) * nodes + column) * levels_];
 }
 
-const cv::Vec3f* FoldedEnvironment::node(int row, int column) const {
-    return &weights_[(static_cast<std::size_t>(row) * nodes + column) * levels_];
-}
-
-cv::Vec3f FoldedEnvironment::radiance(const cv::Vec3f& normal, int label, const ShadingMaps& maps) const {
+cv::Vec3f FoldedEnvironment::radiance(const cv::Vec3f& normal, int label) const {
     const cv::Vec2f square = square_from_normal(normal);
     const LevelPosition column(0.5F * (square[0] + 1), nodes);
     const LevelPosition row(0.5F * (square[1] + 1), nodes);
-    const cv::Vec3f* top = node(row.below, column.below);
-    const cv::Vec3f* bottom = node(row.below + 1, column.below);
-    const cv::Vec3f* shading = maps.radiance[label - 1];
-    const float top_right = (1 - row.fraction) * column.fraction;
-    const float top_left = (1 - row.fraction) - top_right;
-    const float bottom_right = row.fraction * column.fraction;
-    const float bottom_left = row.fraction - bottom_right;
-    cv::Vec3f sum(0, 0, 0);
-    for (int level = 1; level < levels_; ++level)
-        for (int c = 0; c < 3; ++c)
-            sum[c] += shading[level][c] * (top_left * top[level][c] + top_right * top[level + levels_][c] +
-                                           bottom_left * bottom[level][c] + bottom_right * bottom[level + levels_][c]);
-    return sum;
+    const Colour* top = node(row.below, column.below);
+    const Colour* bottom = node(row.below + 1, column.below);
+    const Colour* shading = &shading_[static_cast<std::size_t>(label - 1) * levels_];
+    Colour at_top{};
+    Colour at_top_right{};
+    Colour at_bottom{};
+    Colour at_bottom_right{};
+    for (int level = 0; level < levels_; ++level) {
+        at_top += shading[level] * top[level];
+        at_top_right += shading[level] * top[level + levels_];
+        at_bottom += shading[level] * bottom[level];
+        at_bottom_right += shading[level] * bottom[level + levels_];
+    }
+    const Colour upper = at_top + column.fraction * (at_top_right - at_top);
+    const Colour lower = at_bottom + column.fraction * (at_bottom_right - at_bottom);
+    const Colour sum = upper + row.fraction * (lower - upper);
+    return {sum[0], sum[1], sum[2]};
 }
 
 }  // namespace darkbox

@@ -23,17 +23,20 @@ std::vector<DistantLight> probe_lights(const Environment& environment, double ya
 /// that face away count as the rim's. Immutable after construction, thus thread-safe.
 class FoldedEnvironment {
 public:
-    FoldedEnvironment(const std::vector<DistantLight>& lights, int levels, const RelightOptions& options);
+    FoldedEnvironment(const std::vector<DistantLight>& lights, const ShadingMaps& maps, const RelightOptions& options);
 
     /// Of texel `label` with that unit normal.
-    cv::Vec3f radiance(const cv::Vec3f& normal, int label, const ShadingMaps& maps) const;
+    cv::Vec3f radiance(const cv::Vec3f& normal, int label) const;
 
 private:
-    cv::Vec3f* node(int row, int column);
-    const cv::Vec3f* node(int row, int column) const;
+    /// R, G, B and one lane to spare, in a register.
+    using Colour [[gnu::vector_size(16)]] = float;
+
+    const Colour* node(int row, int column) const;
 
     int levels_;
-    std::vector<cv::Vec3f> weights_;  ///< [row][column][level]
+    std::vector<Colour> weights_;  ///< [row][column][level]
+    std::vector<Colour> shading_;  ///< [texel][level]
 };
 
 }  // namespace darkbox

@@ -181,13 +181,11 @@ RelightResult relight(const RelightScene& scene, const Environment& environment,
     RelightResult result;
     on_threads_of(work, [&] {
         const Stopwatch folding;
-        const FoldedEnvironment folded(probe_lights(environment, options.environment_yaw), scene.shading.levels,
-                                       options);
+        const FoldedEnvironment folded(probe_lights(environment, options.environment_yaw), scene.shading, options);
         result.fold_seconds = folding.seconds();
         const Stopwatch rendering;
-        result.image = render(scene, options, [&](const cv::Vec3f& normal, int label) {
-            return folded.radiance(normal, label, scene.shading);
-        });
+        result.image =
+            render(scene, options, [&](const cv::Vec3f& normal, int label) { return folded.radiance(normal, label); });
         result.render_seconds = rendering.seconds();
     });
     return result;
