@@ -41,10 +41,10 @@ exposure_ms = 20
 gain = 1
 
 [camera.intrinsics]
-mm_per_pixel = 0.5
+mm_per_pixel = 0.625
 
 [ball]
-diameter_mm = 30
+diameter_mm = 36
 
 [sim]
 scene = "brick-torus"
