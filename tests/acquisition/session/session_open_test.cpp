@@ -65,15 +65,15 @@ TEST_F(Open, AnUnsealedSessionIsToldApart) {
 
 struct Hostile {
     const char* what;
-    std::string from;
-    std::string to;
+    const char* from;
+    const char* to;
 };
 
 TEST_F(Open, HostileDocumentsAreOneInputError) {
-    const std::string file = "\"file\": \"frames/0000_lamp-0.tif\"";
-    const std::string width = "\"width\": 16";
-    const std::string lamp = "\"lamp\": 0";
-    const std::vector<Hostile> table{
+    constexpr const char* file = "\"file\": \"frames/0000_lamp-0.tif\"";
+    constexpr const char* width = "\"width\": 16";
+    constexpr const char* lamp = "\"lamp\": 0";
+    const Hostile table[] = {
         {"version 2", "\"schema_version\": 1", "\"schema_version\": 2"},
         {"version text", "\"schema_version\": 1", "\"schema_version\": \"1\""},
         {"version absent", "\"schema_version\": 1", "\"schema\": 1"},

@@ -68,8 +68,8 @@ TEST_F(Resume, AJournalTornAtAnyByteLosesOnlyTheTornLine) {
         ASSERT_EQ(writer.acknowledged().size(), 2u) << length;
         ASSERT_EQ(read_file(torn / "journal.jsonl"), whole.substr(0, last_line)) << length;
         ASSERT_FALSE(fs::exists(torn / "data/frames/0002_lamp-2.tif")) << length;
-        add_numbered(writer, 2);
         if (length % 50 == 0) {
+            add_numbered(writer, 2);
             const Session session = writer.seal();
             expect_numbered(torn, session.frames(), 3);
             session.verify();

@@ -4,7 +4,6 @@
 #include <sys/stat.h>
 
 #include <cstdio>
-#include <regex>
 
 #include "acquisition/session/sha256.h"
 #include "tests/acquisition/session/session_fixture.h"
@@ -15,8 +14,10 @@ namespace {
 namespace fs = std::filesystem;
 using namespace test;
 using testing::AllOf;
+using testing::ContainsRegex;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::MatchesRegex;
 
 /// Exit status of a shell command; 0 is good.
 int run(const std::string& command) {
@@ -125,7 +126,7 @@ TEST_F(Writer, ASealedSessionIsABagThatOtherToolsAccept) {
         if (entry.is_regular_file()) bytes += entry.file_size(), ++files;
     const std::string info = read_file(folder / "bag-info.txt");
     EXPECT_THAT(info, HasSubstr("Payload-Oxum: " + std::to_string(bytes) + "." + std::to_string(files) + "\n"));
-    EXPECT_TRUE(std::regex_search(info, std::regex("Bagging-Date: \\d{4}-\\d{2}-\\d{2}\n"))) << info;
+    EXPECT_THAT(info, ContainsRegex("Bagging-Date: [0-9]{4}-[0-9]{2}-[0-9]{2}\n"));
     EXPECT_THAT(info, HasSubstr("External-Description: "));
 }
 
@@ -271,8 +272,7 @@ TEST(Names, RoundTrip) {
 }
 
 TEST(Names, TimeIsIso8601InUtc) {
-    EXPECT_TRUE(std::regex_match(iso8601_now(), std::regex(R"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z)")))
-        << iso8601_now();
+    EXPECT_THAT(iso8601_now(), MatchesRegex("[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9]{2}:[0-9]{2}:[0-9]{2}\\.[0-9]{3}Z"));
 }
 
 }  // namespace
