@@ -52,8 +52,8 @@ PixelFormat captured_format(const fs::path& file, const FrameRecord& record) {
 
 void require_inside(const fs::path& file, const FrameRecord& record, RowBand band) {
     if (band.first < 0 || band.count < 1 || band.first > record.height - band.count)
-        throw InputError(fmt::format("{}: rows {} to {} asked for, it has {}", file.string(), band.first,
-                                     band.first + band.count - 1, record.height),
+        throw InputError(fmt::format("{}: {} rows from row {} asked for, it has {}", file.string(), band.count,
+                                     band.first, record.height),
                          "ask for rows inside the picture");
 }
 
