@@ -1,0 +1,61 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "processing/formats/report/html.h"
+#include "processing/formats/report/plots.h"
+
+namespace darkbox {
+namespace {
+
+constexpr double radius = 170;  // of the 90 degree rim, SVG units
+constexpr double half = 200;
+constexpr double shown_sigmas = 10;
+
+struct Place {
+    double x = 0;
+    double y = 0;
+    double off_axis_deg = 0;
+};
+
+Place place_of(const Eigen::Vector3d& d) {
+    const double off_axis = angle_deg(d, {0, 0, 1});
+    const double along = std::hypot(d.x(), d.y());
+    const double r = std::min(off_axis / 90.0, 1.1) * radius;
+    return {along > 0 ? d.x() / along * r : 0, along > 0 ? -d.y() / along * r : 0, off_axis};
+}
+
+std::string ring(double degrees) {
+    const double r = degrees / 90.0 * radius;
+    return fmt::format("<circle class='grid' r='{:.1f}'/><text class='tick' x='3' y='{:.1f}'>{:.0f}°</text>", r, -r - 3,
+                       degrees);
+}
+
+std::string mark(const Light& light, std::size_t number) {
+    const Place p = place_of(light.direction);
+    const double sigma = std::max(light.sigma_deg * shown_sigmas / 90.0 * radius, 0.0);
+    const std::string uncertainty =
+        sigma > 0 ? fmt::format("<circle class='sigma' cx='{:.2f}' cy='{:.2f}' r='{:.2f}'/>", p.x, p.y, sigma) : "";
+    return fmt::format(
+        "<g class='{}'><title>{}: {:.1f}° off the camera's axis</title>{}<circle class='lamp' cx='{:.2f}' cy='{:.2f}' "
+        "r='5'/><text class='label' x='{:.2f}' y='{:.2f}'>{}</text></g>",
+        light.used ? "used" : "unused", escaped(light.file), p.off_axis_deg, uncertainty, p.x, p.y, p.x + 8, p.y - 6,
+        number);
+}
+
+}  // namespace
+
+std::string light_plot(const Lights& lights) {
+    std::string svg = fmt::format(
+        "<svg class='plot' viewBox='{0} {0} {1} {1}' role='img' aria-label='light directions'>", -half, 2 * half);
+    for (const double degrees : {30.0, 60.0, 90.0}) svg += ring(degrees);
+    svg += fmt::format("<line class='grid' x1='-{0}' x2='{0}'/><line class='grid' y1='-{0}' y2='{0}'/>", radius);
+    svg += fmt::format("<text class='tick' x='{}' y='14'>x</text><text class='tick' x='6' y='-{}'>y</text>", radius + 8,
+                       radius + 14);
+    for (std::size_t i = 0; i < lights.size(); ++i) svg += mark(lights[i], i + 1);
+    return svg + "</svg>";
+}
+
+}  // namespace darkbox

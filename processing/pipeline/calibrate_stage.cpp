@@ -1,0 +1,129 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "acquisition/frame/error.h"
+#include "processing/formats/calibration_file.h"
+#include "processing/formats/json_file.h"
+#include "processing/formats/light_files.h"
+#include "processing/formats/picture.h"
+#include "processing/formats/png.h"
+#include "processing/pipeline/ball_picture.h"
+#include "processing/pipeline/given_lights.h"
+#include "processing/pipeline/session_files.h"
+#include "processing/pipeline/stack.h"
+#include "processing/pipeline/stages.h"
+#include "processing/pipeline/steps.h"
+#include "processing/pipeline/summary_json.h"
+
+namespace darkbox {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> lamps_of(const std::vector<FrameRecord>& lit) {
+    std::vector<std::string> lamps;
+    for (const FrameRecord& frame : lit) lamps.push_back(frame.lamp_name);
+    return lamps;
+}
+
+Calibration from_given(const GivenLights& given) {
+    Calibration calibration;
+    calibration.lights = given.lights;
+    calibration.highlights.resize(given.lights.size());
+    calibration.condition_number = condition_number(given.lights);
+    calibration.method = "given";
+    calibration.warnings = given.warnings;
+    return calibration;
+}
+
+/// Which stored light belongs to this lamp; by place where lamps have no names in common.
+const Light& stored_light(const StoredCalibration& stored, const FrameRecord& frame, std::size_t place,
+                          const fs::path& file) {
+    const auto named = std::find(stored.lamps.begin(), stored.lamps.end(), frame.lamp_name);
+    if (!frame.lamp_name.empty() && named != stored.lamps.end())
+        return stored.calibration.lights[static_cast<std::size_t>(named - stored.lamps.begin())];
+    if (place >= stored.calibration.lights.size())
+        throw InputError(fmt::format("{} has no light for {}", file.string(), basename_of(frame)),
+                         "use a calibration of the same lamps");
+    return stored.calibration.lights[place];
+}
+
+Calibration from_stored(const fs::path& from, const std::vector<FrameRecord>& lit) {
+    const fs::path file = fs::is_directory(from) ? ResultFiles(from).calibration : from;
+    const StoredCalibration stored = read_calibration(file);
+    Calibration calibration;
+    for (std::size_t i = 0; i < lit.size(); ++i) {
+        calibration.lights.push_back(stored_light(stored, lit[i], i, file));
+        calibration.lights.back().file = basename_of(lit[i]);
+    }
+    calibration.highlights.resize(lit.size());
+    calibration.condition_number = condition_number(calibration.lights);
+    calibration.method = "stored: " + file.string();
+    return calibration;
+}
+
+Ball read_ball(const fs::path& path) {
+    const auto json = read_json(path);
+    return reading_keys(path, "a ball", [&] {
+        return Ball{json.at("x").get<double>(), json.at("y").get<double>(), json.at("radius").get<double>(), 1.0};
+    });
+}
+
+/// What was given at import holds unless the command says otherwise.
+CalibrationOptions with_imported(const Session& session, CalibrationOptions options) {
+    if (options.ball || options.ball_mask) return options;
+    if (const auto ball = extra_of(session, given_ball))
+        options.ball = read_ball(*ball);
+    else if (const auto mask = extra_of(session, ball_mask))
+        options.ball_mask = read_mask(*mask);
+    return options;
+}
+
+void warn_of_few_lights(Calibration& calibration) {
+    const auto used =
+        std::count_if(calibration.lights.begin(), calibration.lights.end(), [](const Light& l) { return l.used; });
+    if (used < 3)
+        calibration.warnings.push_back(
+            fmt::format("only {} lights can be used; normals need three that are not in one plane", used));
+}
+
+}  // namespace
+
+CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& options, const WorkContext& work) {
+    options.calibration.validate();
+    const ResultFiles files(session.folder());
+    const std::vector<FrameRecord> lit = frames_of_kind(session, FrameKind::lit);
+    CalibrateSummary summary;
+    Stopwatch watch;
+    const bool ball_asked_for = options.calibration.ball || options.calibration.ball_mask;
+    const auto given = options.from || ball_asked_for ? std::nullopt : given_lights(session);
+    if (options.from) {
+        summary.calibration = from_stored(*options.from, lit);
+    } else if (given) {
+        summary.calibration = from_given(*given);
+    } else {
+        const BallFrames ball = load_ball_frames(session, work);
+        summary.seconds.read = watch.lap();
+        step(work, {"calibrating lights", 0, 1, "ball and highlights"});
+        summary.calibration = calibrate(ball.frames, ball.files, with_imported(session, options.calibration));
+        summary.seconds.solve = watch.lap();
+        const BallView view = view_of_balls(ball.frames, summary.calibration.balls);
+        write_png(files.ball_picture, draw_balls(view, summary.calibration));
+    }
+    warn_of_few_lights(summary.calibration);
+    write_calibration(files.calibration, summary.calibration, lamps_of(lit));
+    write_lp(files.lights_lp, summary.calibration.lights);
+    summary.seconds.write = watch.lap();
+    write_json(files.calibration_summary, to_json(summary));
+    step(work, {"calibrating lights", 1, 1, ""});
+    return summary;
+}
+
+Lights load_lights(const Session& session) {
+    const ResultFiles files(session.folder());
+    require_made(files.calibration, session, "calibrate");
+    return read_calibration(files.calibration).calibration.lights;
+}
+
+}  // namespace darkbox

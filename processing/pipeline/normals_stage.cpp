@@ -1,0 +1,99 @@
+#include <algorithm>
+
+#include "processing/formats/exr.h"
+#include "processing/formats/json_file.h"
+#include "processing/formats/map_files.h"
+#include "processing/formats/ply.h"
+#include "processing/formats/srgb.h"
+#include "processing/normals/integrate.h"
+#include "processing/pipeline/session_files.h"
+#include "processing/pipeline/stack.h"
+#include "processing/pipeline/stages.h"
+#include "processing/pipeline/steps.h"
+#include "processing/pipeline/summary_json.h"
+#include "processing/pipeline/transfer_check.h"
+
+namespace darkbox {
+namespace {
+
+/// Mean angle over the pixels where both are valid; no value where none are.
+std::optional<double> mean_angle_deg(const NormalMap& a, const NormalMap& b) {
+    if (a.normal.size() != b.normal.size()) return std::nullopt;
+    double sum = 0;
+    std::size_t count = 0;
+    for (int y = 0; y < a.normal.rows; ++y)
+        for (int x = 0; x < a.normal.cols; ++x) {
+            if (!a.valid(y, x) || !b.valid(y, x)) continue;
+            const cv::Vec3f &p = a.normal(y, x), &q = b.normal(y, x);
+            sum += angle_deg({p[0], p[1], p[2]}, {q[0], q[1], q[2]});
+            ++count;
+        }
+    if (count == 0) return std::nullopt;
+    return sum / static_cast<double>(count);
+}
+
+std::optional<double> error_against_truth(const Session& session, const NormalMap& normals) {
+    const auto truth = extra_of(session, given_truth);
+    return truth ? mean_angle_deg(normals, read_normal_truth(*truth)) : std::nullopt;
+}
+
+/// The curve of 8-bit imports: the one choice that the pictures themselves can contradict.
+std::optional<TransferCurve> doubtful_curve(const Session& session) {
+    const auto lit = frames_of_kind(session, FrameKind::lit);
+    const bool doubtful = session.info().source == "import" && !lit.empty() &&
+                          std::all_of(lit.begin(), lit.end(), [&](const FrameRecord& frame) {
+                              return frame.bit_depth == 8 && frame.transfer == lit.front().transfer;
+                          });
+    return doubtful ? std::optional(lit.front().transfer) : std::nullopt;
+}
+
+void write_maps(const ResultFiles& files, const PhotometricStereoResult& solved, const WorkContext& work) {
+    step(work, {"integrating height", 0, 1, ""});
+    const cv::Mat1f height = integrate_normals(solved.normals);
+    step(work, {"writing maps", 0, 1, files.results_folder.string()});
+    write_normal_map(files.normals, solved.normals);
+    write_normal_map(files.normals_png, solved.normals);
+    write_albedo_map(files.albedo, solved.albedo);
+    write_albedo_map(files.albedo_png, solved.albedo, viewing_gain(solved.albedo.albedo, solved.albedo.valid));
+    cv::Mat1f used;
+    solved.lights_used.convertTo(used, CV_32F);
+    write_exr(files.confidence, {{"lights_used", used}, {"residual", solved.residual}});
+    write_exr(files.height, height);
+    write_ply(files.surface, height, solved.normals, solved.albedo);
+}
+
+}  // namespace
+
+NormalsSummary run_normals(const Session& session, const PhotometricStereoOptions& options, const WorkContext& work) {
+    options.validate();
+    const ResultFiles files(session.folder());
+    const Lights lights = load_lights(session);
+    require_solvable(lights);
+    NormalsSummary summary;
+    Stopwatch watch;
+    const PhotoStack stack = load_stack(session, work);
+    summary.seconds.read = watch.lap();
+    step(work, {"solving normals", 0, 1, ""});
+    const PhotometricStereoResult solved = photometric_stereo(stack, lights, options, work);
+    watch.lap();
+    summary.seconds.solve = solved.seconds;
+    summary.solver = "lsq";
+    summary.images = stack.images.size();
+    summary.pixels = solved.pixels;
+    summary.residual_rms = solved.residual_rms;
+    summary.mean_angular_error_deg = error_against_truth(session, solved.normals);
+    const double megapixels = static_cast<double>(stack.mask.total()) / 1e6;
+    summary.megapixel_images_per_second =
+        megapixels * static_cast<double>(summary.images) / std::max(solved.seconds, 1e-9);
+    if (const auto curve = doubtful_curve(session))
+        if (const auto warning = transfer_warning(stack, lights, *curve, solved.residual_rms, work))
+            summary.warnings.push_back(*warning);
+    watch.lap();
+    write_maps(files, solved, work);
+    summary.seconds.write = watch.lap();
+    write_json(files.results_summary, to_json(summary));
+    step(work, {"writing maps", 1, 1, ""});
+    return summary;
+}
+
+}  // namespace darkbox

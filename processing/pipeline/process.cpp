@@ -1,0 +1,19 @@
+#include "processing/pipeline/stages.h"
+
+namespace darkbox {
+
+ProcessSummary run_process(const Session& session, const ProcessOptions& options, const WorkContext& work) {
+    options.calibrate.calibration.validate();
+    options.normals.validate();
+    options.texels.validate();
+    options.shading.validate();
+    ProcessSummary summary;
+    summary.calibrate = run_calibrate(session, options.calibrate, work);
+    summary.normals = run_normals(session, options.normals, work);
+    summary.texels = run_texels(session, options.texels, work);
+    summary.shade = run_shade(session, options.shading, work);
+    summary.report = run_report(session, work);
+    return summary;
+}
+
+}  // namespace darkbox

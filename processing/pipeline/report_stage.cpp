@@ -1,0 +1,189 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "processing/formats/atomic_file.h"
+#include "processing/formats/calibration_file.h"
+#include "processing/formats/exr.h"
+#include "processing/formats/json_file.h"
+#include "processing/formats/map_files.h"
+#include "processing/formats/png.h"
+#include "processing/formats/report/report.h"
+#include "processing/formats/srgb.h"
+#include "processing/pipeline/ball_picture.h"
+#include "processing/pipeline/default_relit.h"
+#include "processing/pipeline/false_colour.h"
+#include "processing/pipeline/session_files.h"
+#include "processing/pipeline/stack.h"
+#include "processing/pipeline/stages.h"
+#include "processing/pipeline/steps.h"
+
+namespace darkbox {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t histogram_bins = 64;
+
+std::string controls_of(const std::vector<FrameRecord>& lit) {
+    const FrameRecord& first = lit.front();
+    std::string text = fmt::format("{}x{} pixels, {} bit {}, {}", first.width, first.height, first.bit_depth,
+                                   first.format, first.transfer == TransferCurve::linear ? "linear" : "sRGB");
+    if (first.exposure_s > 0) text += fmt::format(", {:.4g} ms, gain {:.3g}", first.exposure_s * 1e3, first.gain);
+    return text;
+}
+
+void add_facts(const Session& session, ReportContent& content) {
+    const SessionInfo& info = session.info();
+    const auto lit = frames_of_kind(session, FrameKind::lit);
+    content.facts = {{"Object", info.object}, {"Taken", info.created}, {"Source", info.source}};
+    if (!info.rig.empty()) content.facts.emplace_back("Rig", info.rig);
+    if (!info.camera.empty()) content.facts.emplace_back("Camera", info.camera);
+    content.facts.emplace_back("Frames", fmt::format("{} lit of {}", lit.size(), session.frames().size()));
+    if (!lit.empty()) content.facts.emplace_back("Format", controls_of(lit));
+    for (const std::string& note : info.notes) {
+        constexpr std::string_view warning = "warning: ";
+        if (note.starts_with(warning))
+            content.warnings.push_back(note.substr(warning.size()));
+        else
+            content.facts.emplace_back("Note", note);
+    }
+    for (const SessionEvent& event : session.events())
+        content.facts.emplace_back("Event", event.when + " " + event.what);
+}
+
+/// What the frames themselves show: their mean, and how they are exposed.
+void add_photographs(const PhotoStack& stack, ReportContent& content) {
+    cv::Mat3f mean(stack.size(), cv::Vec3f(0, 0, 0));
+    for (const cv::Mat3f& image : stack.images) mean += image;
+    mean /= static_cast<double>(stack.images.size());
+    content.pictures.push_back({viewable(mean, viewing_gain(mean, stack.mask)), "Mean photograph",
+                                fmt::format("Mean of {} photographs, brightened for viewing", stack.images.size())});
+    std::vector<double> bins(histogram_bins, 0.0);
+    double count = 0;
+    for (const cv::Mat3f& image : stack.images)
+        for (int y = 0; y < image.rows; ++y)
+            for (int x = 0; x < image.cols; ++x) {
+                if (!stack.mask(y, x)) continue;
+                const cv::Vec3f& p = image(y, x);
+                const double value = std::clamp<double>(std::max({p[0], p[1], p[2]}), 0.0, 1.0);
+                bins[std::min(static_cast<std::size_t>(value * histogram_bins), histogram_bins - 1)] += 1;
+                count += 1;
+            }
+    for (double& bin : bins) bin /= std::max(count, 1.0);
+    content.exposure_histogram = bins;
+}
+
+void add_calibration(const Session& session, const ResultFiles& files, ReportContent& content,
+                     const WorkContext& work) {
+    const Calibration calibration = read_calibration(files.calibration).calibration;
+    content.lights = calibration.lights;
+    content.condition_number = calibration.condition_number;
+    content.warnings.insert(content.warnings.end(), calibration.warnings.begin(), calibration.warnings.end());
+    content.facts.emplace_back(
+        "Lights", fmt::format("{}, {} of {} used", calibration.method, direction_matrix(calibration.lights).rows(),
+                              calibration.lights.size()));
+    for (const std::string& rejected : calibration.rejected) content.facts.emplace_back("Left out", rejected);
+    if (calibration.balls.empty()) return;
+    const BallView view = view_of_balls(load_ball_frames(session, work).frames, calibration.balls);
+    ReportBall ball{view.image, {}, {}};
+    for (const Ball& found : calibration.balls) {
+        const cv::Point2d centre = view.in_view(found.x, found.y);
+        ball.balls.push_back({centre.x, centre.y, found.radius * view.scale, found.confidence});
+    }
+    for (std::size_t i = 0; i < calibration.highlights.size(); ++i) {
+        if (!calibration.highlights[i]) continue;
+        Highlight highlight = *calibration.highlights[i];
+        const cv::Point2d at = view.in_view(highlight.u, highlight.v);
+        highlight.u = at.x;
+        highlight.v = at.y;
+        ball.highlights.emplace_back(calibration.lights[i].file, highlight);
+    }
+    content.ball = ball;
+}
+
+void add_normals(const ResultFiles& files, ReportContent& content) {
+    const NormalMap normals = read_normal_map(files.normals);
+    const AlbedoMap albedo = read_albedo_map(files.albedo, normals.valid);
+    const cv::Mat1f residual = read_exr_channel(files.confidence, "residual");
+    const cv::Mat1f height = read_exr_channel(files.height, "Y");
+    const double gain = viewing_gain(albedo.albedo, albedo.valid);
+    content.pictures.push_back(
+        {normal_colours(normals), "Normals", "Red = right, green = up, blue = towards the camera"});
+    content.pictures.push_back(
+        {viewable(albedo.albedo, gain), "Albedo", fmt::format("The unshaded image, brightened {:.3g} times", gain)});
+    cv::Mat3f grey;
+    cv::merge(std::vector<cv::Mat>{residual, residual, residual}, grey);
+    const double top = 1.0 / viewing_gain(grey, normals.valid, 99.0);
+    content.pictures.push_back(
+        {heat(residual, normals.valid, top), "Residual",
+         fmt::format("What Lambert's law leaves unexplained; white is {:.3g} of full scale", top)});
+    double low = 0, high = 0;
+    cv::minMaxLoc(height, &low, &high, nullptr, nullptr, normals.valid);
+    content.pictures.push_back({heat(cv::Mat(height - low), normals.valid, std::max(high - low, 1e-6)), "Height",
+                                fmt::format("From dark (far) to white (near), {:.0f} pixels in all", high - low)});
+}
+
+void add_texels(const ResultFiles& files, ReportContent& content) {
+    const IndexMap index = read_index_map(files.index);
+    content.pictures.push_back(
+        {false_colours(index), "Texels", fmt::format("{} texels in false colours", index.texels)});
+}
+
+/// Timings and warnings that the stages left in their summaries.
+void add_summary(const fs::path& file, const std::string& stage, ReportContent& content) {
+    if (!fs::exists(file)) return;
+    const auto json = read_json(file);
+    reading_keys(file, "a summary of a stage", [&] {
+        for (const auto& [part, seconds] : json.at("seconds").items())
+            content.timings.emplace_back(stage + ": " + part, seconds.get<double>());
+        if (stage != "normals") return;
+        for (const auto& warning : json.at("warnings")) content.warnings.push_back(warning.get<std::string>());
+        content.facts.emplace_back(
+            "Residual", fmt::format("{:.4g} of full scale over {} pixels", json.at("residual_rms").get<double>(),
+                                    json.at("pixels").get<std::size_t>()));
+        if (json.contains("mean_angular_error_deg"))
+            content.facts.emplace_back("Angular error", fmt::format("{:.2f}° mean against the given truth",
+                                                                    json.at("mean_angular_error_deg").get<double>()));
+    });
+}
+
+std::vector<fs::path> add_relit(const Session& session, const ResultFiles& files, ReportContent& content,
+                                const WorkContext& work) {
+    std::vector<fs::path> written;
+    for (RelitPicture& picture : relight_by_default(load_scene(session), work)) {
+        written.push_back(files.results_folder / ("relit-" + picture.name + ".png"));
+        write_png(written.back(), picture.image);
+        content.relit.push_back({std::move(picture.image), picture.name, picture.caption});
+    }
+    return written;
+}
+
+}  // namespace
+
+ReportSummary run_report(const Session& session, const WorkContext& work) {
+    const ResultFiles files(session.folder());
+    ReportSummary summary;
+    Stopwatch watch;
+    ReportContent content;
+    content.title = session.info().object.empty() ? session.folder().filename().string() : session.info().object;
+    add_facts(session, content);
+    add_photographs(load_stack(session, work), content);
+    if (fs::exists(files.calibration)) add_calibration(session, files, content, work);
+    if (fs::exists(files.normals)) add_normals(files, content);
+    if (fs::exists(files.index)) add_texels(files, content);
+    if (fs::exists(files.shading)) summary.relit = add_relit(session, files, content, work);
+    add_summary(files.calibration_summary, "calibrate", content);
+    add_summary(files.results_summary, "normals", content);
+    add_summary(files.texels, "texels", content);
+    add_summary(files.shading_summary, "shade", content);
+    step(work, {"writing the report", 0, 1, files.report.string()});
+    write_file(files.report, report_html(content));
+    summary.file = files.report;
+    summary.warnings = content.warnings;
+    summary.seconds = watch.lap();
+    step(work, {"writing the report", 1, 1, ""});
+    return summary;
+}
+
+}  // namespace darkbox

@@ -1,0 +1,55 @@
+#include "processing/pipeline/session_files.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "acquisition/frame/error.h"
+
+namespace darkbox {
+
+namespace fs = std::filesystem;
+
+ResultFiles::ResultFiles(const fs::path& s)
+    : calibration(s / "calibration/lights.json"),
+      lights_lp(s / "calibration/lights.lp"),
+      ball_picture(s / "calibration/ball.png"),
+      calibration_summary(s / "calibration/summary.json"),
+      normals(s / "results/normals.exr"),
+      normals_png(s / "results/normals.png"),
+      albedo(s / "results/albedo.exr"),
+      albedo_png(s / "results/albedo.png"),
+      confidence(s / "results/confidence.exr"),
+      height(s / "results/height.exr"),
+      surface(s / "results/surface.ply"),
+      results_summary(s / "results/summary.json"),
+      index(s / "texels/index.png"),
+      texels(s / "texels/texels.json"),
+      shading(s / "shading/shading_maps.exr"),
+      shading_json(s / "shading/shading.json"),
+      shading_summary(s / "shading/summary.json"),
+      results_folder(s / "results"),
+      report(s / "report.html") {}
+
+void require_made(const fs::path& file, const Session& session, const char* command) {
+    if (!fs::exists(file))
+        throw InputError(fmt::format("{} is not there yet", file.string()),
+                         fmt::format("run 'darkbox {} {}' first", command, session.folder().string()));
+}
+
+std::vector<FrameRecord> frames_of_kind(const Session& session, FrameKind kind) {
+    std::vector<FrameRecord> frames;
+    std::copy_if(session.frames().begin(), session.frames().end(), std::back_inserter(frames),
+                 [kind](const FrameRecord& frame) { return frame.kind == kind; });
+    return frames;
+}
+
+std::string basename_of(const FrameRecord& frame) { return fs::path(frame.file).filename().string(); }
+
+std::optional<fs::path> extra_of(const Session& session, const char* name) {
+    const auto& extras = session.extras();
+    if (std::find(extras.begin(), extras.end(), name) == extras.end()) return std::nullopt;
+    return session.path_of_extra(name);
+}
+
+}  // namespace darkbox

@@ -1,0 +1,79 @@
+#include "processing/pipeline/summary_json.h"
+
+namespace darkbox {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json seconds_json(const StageSeconds& seconds) {
+    return {{"read", seconds.read}, {"solve", seconds.solve}, {"write", seconds.write}};
+}
+
+ordered_json triple(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
+
+}  // namespace
+
+ordered_json to_json(const CalibrateSummary& summary) {
+    const Calibration& calibration = summary.calibration;
+    ordered_json lights = ordered_json::array(), balls = ordered_json::array();
+    for (const Light& light : calibration.lights)
+        lights.push_back({{"file", light.file},
+                          {"direction", triple(light.direction)},
+                          {"sigma_deg", light.sigma_deg},
+                          {"intensity", triple(light.intensity)},
+                          {"used", light.used}});
+    for (const Ball& ball : calibration.balls) balls.push_back({{"x", ball.x}, {"y", ball.y}, {"radius", ball.radius}});
+    return {{"method", calibration.method},
+            {"lights", lights},
+            {"balls", balls},
+            {"condition_number", calibration.condition_number},
+            {"contour_rms_px", calibration.contour_rms_px},
+            {"rejected", calibration.rejected},
+            {"warnings", calibration.warnings},
+            {"seconds", seconds_json(summary.seconds)}};
+}
+
+ordered_json to_json(const NormalsSummary& summary) {
+    ordered_json json{{"solver", summary.solver},
+                      {"images", summary.images},
+                      {"pixels", summary.pixels},
+                      {"residual_rms", summary.residual_rms},
+                      {"seconds", seconds_json(summary.seconds)},
+                      {"megapixel_images_per_second", summary.megapixel_images_per_second},
+                      {"warnings", summary.warnings}};
+    if (summary.mean_angular_error_deg) json["mean_angular_error_deg"] = *summary.mean_angular_error_deg;
+    return json;
+}
+
+ordered_json to_json(const TexelsSummary& summary) {
+    return {{"texels", summary.texels},
+            {"within_cluster_variance", summary.within_cluster_variance},
+            {"variance_explained", summary.variance_explained},
+            {"seconds", seconds_json(summary.seconds)}};
+}
+
+ordered_json to_json(const ShadeSummary& summary) {
+    return {{"texels", summary.texels},
+            {"levels", summary.levels},
+            {"samples", summary.samples},
+            {"seconds", seconds_json(summary.seconds)}};
+}
+
+ordered_json to_json(const ReportSummary& summary) {
+    ordered_json relit = ordered_json::array();
+    for (const auto& file : summary.relit) relit.push_back(file.string());
+    return {{"report", summary.file.string()},
+            {"relit", relit},
+            {"warnings", summary.warnings},
+            {"seconds", summary.seconds}};
+}
+
+ordered_json to_json(const ProcessSummary& summary) {
+    return {{"calibrate", to_json(summary.calibrate)},
+            {"normals", to_json(summary.normals)},
+            {"texels", to_json(summary.texels)},
+            {"shade", to_json(summary.shade)},
+            {"report", to_json(summary.report)}};
+}
+
+}  // namespace darkbox

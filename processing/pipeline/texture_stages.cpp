@@ -1,0 +1,93 @@
+#include <numeric>
+
+#include "processing/formats/json_file.h"
+#include "processing/formats/map_files.h"
+#include "processing/pipeline/session_files.h"
+#include "processing/pipeline/stack.h"
+#include "processing/pipeline/stages.h"
+#include "processing/pipeline/steps.h"
+#include "processing/pipeline/summary_json.h"
+
+namespace darkbox {
+namespace {
+
+struct Maps {
+    NormalMap normals;
+    AlbedoMap albedo;
+};
+
+Maps read_maps(const Session& session) {
+    const ResultFiles files(session.folder());
+    require_made(files.normals, session, "normals");
+    require_made(files.albedo, session, "normals");
+    Maps maps{read_normal_map(files.normals), {}};
+    maps.albedo = read_albedo_map(files.albedo, maps.normals.valid);
+    return maps;
+}
+
+IndexMap read_index(const Session& session) {
+    const ResultFiles files(session.folder());
+    require_made(files.index, session, "texels");
+    return read_index_map(files.index);
+}
+
+}  // namespace
+
+TexelsSummary run_texels(const Session& session, const TexelOptions& options, const WorkContext& work) {
+    options.validate();
+    const ResultFiles files(session.folder());
+    TexelsSummary summary;
+    Stopwatch watch;
+    const Maps maps = read_maps(session);
+    summary.seconds.read = watch.lap();
+    step(work, {"clustering texels", 0, 1, ""});
+    const TexelResult clustered = cluster_texels(maps.albedo, options, work);
+    watch.lap();
+    summary.seconds.solve = clustered.seconds;
+    summary.texels = clustered.index.texels;
+    summary.within_cluster_variance = clustered.within_cluster_variance;
+    summary.variance_explained = clustered.variance_explained;
+    write_index_map(files.index, clustered.index);
+    summary.seconds.write = watch.lap();
+    write_json(files.texels, to_json(summary));
+    step(work, {"clustering texels", 1, 1, ""});
+    return summary;
+}
+
+ShadeSummary run_shade(const Session& session, const ShadingOptions& options, const WorkContext& work) {
+    options.validate();
+    const ResultFiles files(session.folder());
+    const Lights lights = load_lights(session);
+    ShadeSummary summary;
+    Stopwatch watch;
+    const Maps maps = read_maps(session);
+    const IndexMap index = read_index(session);
+    const PhotoStack stack = load_stack(session, work);
+    summary.seconds.read = watch.lap();
+    step(work, {"measuring shading maps", 0, 1, ""});
+    const ShadingResult shaded = shading_maps(stack, lights, maps.normals, maps.albedo, index, options, work);
+    watch.lap();
+    summary.seconds.solve = shaded.seconds;
+    summary.texels = shaded.maps.texels;
+    summary.levels = shaded.maps.levels;
+    summary.samples =
+        std::accumulate(shaded.maps.samples.begin(), shaded.maps.samples.end(), std::size_t{0},
+                        [](std::size_t sum, int samples) { return sum + static_cast<std::size_t>(samples); });
+    write_shading_maps(files.shading, files.shading_json, shaded.maps);
+    summary.seconds.write = watch.lap();
+    write_json(files.shading_summary, to_json(summary));
+    step(work, {"measuring shading maps", 1, 1, ""});
+    return summary;
+}
+
+RelightScene load_scene(const Session& session) {
+    const ResultFiles files(session.folder());
+    const Maps maps = read_maps(session);
+    RelightScene scene{maps.normals, maps.albedo, read_index(session), {}};
+    require_made(files.shading, session, "shade");
+    require_made(files.shading_json, session, "shade");
+    scene.shading = read_shading_maps(files.shading, files.shading_json);
+    return scene;
+}
+
+}  // namespace darkbox
