@@ -1,0 +1,38 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "processing/transfer/features.h"
+#include "processing/transfer/kd_tree.h"
+
+namespace darkbox {
+
+/// Finds, among many long vectors, those nearest to another: their principal components are kept in a k-d tree, which
+/// gives a short list for the caller to rank by the exact distance. A distance in the tree is never more than the exact
+/// one. Immutable after construction, thus thread-safe; built on TBB's threads, equal on any number of them.
+class NearestFeatures {
+public:
+    /// Writes vector i, of the one length that all have.
+    using Reader = std::function<void(std::size_t i, Feature& feature)>;
+
+    /// `count` is at least 1; `seed` picks the sample that the components are learned from.
+    NearestFeatures(std::size_t count, const Reader& reader, std::uint64_t seed);
+
+    /// Those nearest in the tree and there nearer than `squared_radius`; `matches` and `query` are used again.
+    void short_list(const Feature& feature, float squared_radius, std::vector<float>& query,
+                    std::vector<Match>& matches) const;
+
+private:
+    Eigen::VectorXf mean_;
+    Eigen::MatrixXf axes_;  ///< one column for each component
+    std::unique_ptr<const KdTree> tree_;
+
+    void learn_axes(std::size_t count, const Reader& reader, std::uint64_t seed);
+    void project(const Feature& feature, float* point) const;
+};
+
+}  // namespace darkbox
