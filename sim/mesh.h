@@ -43,15 +43,15 @@ TriangleMesh tessellated(const ParametricSurface& surface, int cells_u, int cell
 /// A torus about the z axis through `centre`.
 struct Torus {
     Vec3 centre;
-    double ring_mm = 41.0;
-    double tube_mm = 19.0;
+    double ring_mm = 37.0;
+    double tube_mm = 17.0;
 };
 TriangleMesh torus_mesh(const Torus& torus);
 
 /// A rectangle about the origin, raised by height(x, y) in mm towards the camera.
 struct HeightField {
-    double width_mm = 120.0;
-    double height_mm = 110.0;
+    double width_mm = 104.0;
+    double height_mm = 98.0;
     std::function<double(double, double)> height;
 };
 TriangleMesh height_field_mesh(const HeightField& field, int cells);

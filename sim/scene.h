@@ -55,10 +55,10 @@ enum class Projection { orthographic, perspective };
 /// The camera looks along -z; the optical axis goes through the viewer frame's origin and the picture's centre.
 struct View {
     Projection projection = Projection::orthographic;
-    int width = 320;              ///< pixels
-    int height = 240;             ///< pixels
-    double mm_per_pixel = 0.625;  ///< in the plane z = 0
-    double distance_mm = 800.0;   ///< of a perspective camera's centre from the origin
+    int width = 320;             ///< pixels
+    int height = 240;            ///< pixels
+    double mm_per_pixel = 0.5;   ///< in the plane z = 0
+    double distance_mm = 800.0;  ///< of a perspective camera's centre from the origin
 };
 
 /// The ray through pixel coordinates (u, v), starting in front of everything.

@@ -9,10 +9,11 @@ namespace darkbox::sim {
 
 /// A linear sensor. Plain data.
 struct Sensor {
-    int bit_depth = 12;                 ///< 8 to 16
-    double black_level = 64;            ///< sample units
-    double full_well_e = 20000;         ///< electrons at full scale, gain 1; the well holds no more
-    double read_noise_e = 5;            ///< standard deviation, before the gain
+    int bit_depth = 12;          ///< 8 to 16
+    double black_level = 64;     ///< sample units
+    double full_well_e = 20000;  ///< electrons at full scale, gain 1
+    double well_margin = 1.05;   ///< the well holds this times full_well_e: what is saturated clips, noise or not
+    double read_noise_e = 5;     ///< standard deviation, before the gain
     double full_scale_radiance = 1.05;  ///< that fills the well in reference_exposure_s
     double reference_exposure_s = 0.02;
     std::uint64_t seed = 1;

@@ -22,10 +22,10 @@ Rgb stone_colour(const Vec3& p, std::uint64_t seed) {
     const Vec3 bent = p / 11.0 + Vec3{1, 1, 1} * (0.35 * fractal_noise(p / 7.0, 3, seed + 10));
     const Cell grain = cellular_noise(bent, seed + 20);
     const double ochre = smooth_step(-0.35, 0.45, fractal_noise(p / 24.0, 4, seed + 30));
-    const Rgb ground = mix(Rgb{0.40, 0.40, 0.41}, Rgb{0.66, 0.53, 0.36}, ochre);
+    const Rgb ground = mix(Rgb{0.52, 0.52, 0.53}, Rgb{0.84, 0.69, 0.48}, ochre);
     const double tone = 0.75 + 0.35 * (static_cast<double>(grain.id >> 40) * 0x1.0p-24);
     const double joint = smooth_step(0.02, 0.16, grain.second - grain.nearest);
-    const double dust = 1.0 + 0.18 * fractal_noise(p / 2.5, 2, seed + 40);
+    const double dust = 1.0 + 0.12 * fractal_noise(p / 2.5, 2, seed + 40);
     return ground * (tone * dust * (0.45 + 0.55 * joint));
 }
 
@@ -45,8 +45,8 @@ public:
         const Vec3& p = point.position;
         const double cover = smooth_step(-0.02, 0.16, fractal_noise(p / 17.0, 5, seed_ + 1));
         const double lush = 0.5 + 0.5 * fractal_noise(p / 3.2, 3, seed_ + 2);
-        const Rgb moss = mix(Rgb{0.10, 0.20, 0.05}, Rgb{0.42, 0.58, 0.16}, std::clamp(lush, 0.0, 1.0));
-        return mix(stone_colour(p, seed_ + 3) * 1.1, moss, cover);
+        const Rgb moss = mix(Rgb{0.10, 0.20, 0.05}, Rgb{0.50, 0.68, 0.20}, std::clamp(lush, 0.0, 1.0));
+        return mix(stone_colour(p, seed_ + 3), moss, cover);
     }
 
 private:
@@ -58,8 +58,8 @@ public:
     explicit Marble(std::uint64_t seed) : seed_(seed) {}
     Rgb albedo(const SurfacePoint& point) const override {
         const Vec3& p = point.position;
-        const double bend = 2.6 * fractal_noise(p / 30.0, 6, seed_);
-        const double wave = std::abs(std::sin(dot(p, Vec3{0.05, 0.09, 0.07}) + bend));
+        const double bend = 3.2 * fractal_noise(p / 26.0, 6, seed_);
+        const double wave = std::abs(std::sin(dot(p, Vec3{0.08, 0.14, 0.11}) + bend));
         const double vein = 1.0 - smooth_step(0.0, 0.42, wave);
         const double cloud = 0.5 + 0.5 * fractal_noise(p / 14.0, 4, seed_ + 7);
         const Rgb ground = mix(Rgb{0.84, 0.82, 0.78}, Rgb{0.66, 0.68, 0.72}, std::clamp(cloud, 0.0, 1.0));

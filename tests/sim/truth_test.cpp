@@ -1,0 +1,89 @@
+#include "sim/truth.h"
+
+#include <ImathBox.h>
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfInputFile.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+
+#include "acquisition/device/device_error.h"
+#include "sim/renderer.h"
+#include "sim/sim_rig.h"
+#include "tests/sim/sim_test_support.h"
+#include "tests/support/test_data.h"
+
+namespace darkbox::sim {
+namespace {
+
+std::string text_of(const std::filesystem::path& file) {
+    std::ostringstream text;
+    text << std::ifstream(file).rdbuf();
+    return text.str();
+}
+
+RgbImage read_exr(const std::filesystem::path& file) {
+    Imf::InputFile input(file.c_str());
+    const auto window = input.header().dataWindow();
+    RgbImage image(window.max.x + 1, window.max.y + 1);
+    Imf::FrameBuffer buffer;
+    const std::size_t pixel = 3 * sizeof(float);
+    auto* base = reinterpret_cast<char*>(image.samples.data());
+    buffer.insert("R", Imf::Slice(Imf::FLOAT, base, pixel, pixel * image.width));
+    buffer.insert("G", Imf::Slice(Imf::FLOAT, base + sizeof(float), pixel, pixel * image.width));
+    buffer.insert("B", Imf::Slice(Imf::FLOAT, base + 2 * sizeof(float), pixel, pixel * image.width));
+    input.setFrameBuffer(buffer);
+    input.readPixels(0, window.max.y);
+    return image;
+}
+
+TEST(Truth, FilesHoldWhatWasTrue) {
+    const test::TemporaryFolder folder;
+    SimRig rig = SimRig::make(small_rig("torus-moss"));
+    rig.camera().configure({});
+    rig.camera().start();
+    const Nanoseconds second{1'000'000'000};
+    rig.camera().next_frame(rig.clock().now() + second);
+    rig.lamps().light(LampId{1}, 1.0);
+    rig.camera().next_frame(rig.clock().now() + second);
+    rig.write_truth(folder.path() / "truth");
+
+    const auto path = folder.path() / "truth";
+    const SceneTruth truth = render_truth(rig.scene());
+    EXPECT_EQ(read_exr(path / "normals.exr").samples, truth.normals.samples);
+    EXPECT_EQ(read_exr(path / "albedo.exr").samples, truth.albedo.samples);
+    const cv::Mat1b mask = cv::imread((path / "mask.png").string(), cv::IMREAD_UNCHANGED);
+    ASSERT_EQ(mask.cols, 64);
+    for (int v = 0; v < 48; ++v)
+        for (int u = 0; u < 64; ++u)
+            ASSERT_EQ(mask(v, u), truth.mask[static_cast<std::size_t>(v * 64 + u)] != 0 ? 255 : 0);
+
+    EXPECT_EQ(text_of(path / "lights.lp"),
+              "3\nlamp-1 0.000000000 0.573462344 0.819231921\nlamp-2 0.573462344 0.000000000 0.819231921\n"
+              "lamp-3 0.000000000 0.000000000 1.000000000\n");
+    const auto lamps = nlohmann::json::parse(text_of(path / "lamps.json"));
+    ASSERT_EQ(lamps["frames"].size(), 2U);
+    EXPECT_TRUE(lamps["frames"][0]["lamps"].empty());
+    EXPECT_EQ(lamps["frames"][1]["sequence"], 1);
+    EXPECT_EQ(lamps["frames"][1]["lamps"][0]["name"], "lamp-2");
+    EXPECT_EQ(lamps["frames"][1]["lamps"][0]["share"], 1.0);
+    const auto ball = nlohmann::json::parse(text_of(path / "ball.json"))["balls"][0];
+    EXPECT_NEAR(ball["radius"].get<double>(), 18.0 / 2.5, 1e-9);
+    EXPECT_NEAR(ball["x"].get<double>(), 22.0 / 2.5 - 0.5, 1e-9);
+    EXPECT_NEAR(ball["y"].get<double>(), 47.5 - 22.0 / 2.5, 1e-9);
+}
+
+TEST(Truth, AFolderThatCannotBeMadeIsNamed) {
+    const test::TemporaryFolder folder;
+    std::ofstream(folder.path() / "file") << "in the way";
+    const SimRig rig = SimRig::make(small_rig());
+    EXPECT_THROW(rig.write_truth(folder.path() / "file" / "truth"), DeviceError);
+}
+
+}  // namespace
+}  // namespace darkbox::sim
