@@ -2,12 +2,16 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "processing/formats/atomic_file.h"
 #include "processing/formats/calibration_file.h"
 #include "processing/formats/environment_file.h"
 #include "processing/formats/exr.h"
 #include "processing/formats/ply.h"
+#include "processing/formats/report/html.h"
+#include "processing/formats/report/report.h"
 #include "tests/support/test_data.h"
 #include "tests/support/throws.h"
 
@@ -81,18 +85,21 @@ TEST_F(Files, EnvironmentsAreCheckedForShapeAndNumbers) {
     write_exr(at("e.exr"), cv::Mat3f(8, 8, cv::Vec3f(1, 1, 1)));
     EXPECT_THAT(input_error_of([&] { read_environment(at("e.exr")); }), HasSubstr("twice as wide"));
     write_file(at("e.hdr"), "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8 +X 16\nshort");
-    EXPECT_THAT(input_error_of([&] { read_environment(at("e.hdr")); }), HasSubstr("damaged or cut short"));
-    write_file(at("e.hdr"), "P6 1 1 255");
+    EXPECT_THAT(input_error_of([&] { read_environment(at("e.hdr")); }), HasSubstr("e.hdr is cut short"));
+    write_file(at("e.hdr"), "P6 1 1\n255");
     EXPECT_THAT(input_error_of([&] { read_environment(at("e.hdr")); }), HasSubstr("not a Radiance"));
 }
 
-TEST(RealProbes, AreReadAndBrightestAtTheirSky) {
+TEST(RealProbes, AreReadAsOpenCvReadsThem) {
     DARKBOX_NEED_DATA(data, "hdr_probes");
     for (const auto& entry : fs::directory_iterator(data)) {
         if (entry.path().extension() != ".hdr") continue;
         const Environment probe = read_environment(entry.path());
         EXPECT_EQ(probe.radiance.size(), cv::Size(256, 128));
         EXPECT_GT(cv::mean(probe.radiance)[0], 0.01) << entry.path();
+        cv::Mat3f known = cv::imread(entry.path().string(), cv::IMREAD_ANYDEPTH | cv::IMREAD_COLOR);
+        cv::cvtColor(known, known, cv::COLOR_BGR2RGB);
+        EXPECT_EQ(cv::norm(probe.radiance, known, cv::NORM_INF), 0) << entry.path();
         const auto bytes = read_file(entry.path());
         test::TemporaryFolder folder;
         write_file(folder.path() / "cut.hdr", std::span(bytes).first(bytes.size() / 2));
@@ -113,6 +120,34 @@ TEST_F(Files, PlyHasAVertexPerPixelAndTwoTrianglesPerSquare) {
     EXPECT_EQ(body, 8u * (6 * 4 + 3) + 6u * (1 + 3 * 4));
     write_ply(at("mm.ply"), cv::Mat1f(3, 3, 0.0F), normals, albedo, 0.25);
     EXPECT_THAT(read_text(at("mm.ply")), HasSubstr("millimetres (0.25 per pixel)"));
+}
+
+TEST(Base64, PadsAsTheStandardSays) {  // RFC 4648, section 10
+    const auto of = [](std::string_view text) { return base64(std::as_bytes(std::span(text))); };
+    EXPECT_EQ(of(""), "");
+    EXPECT_EQ(of("f"), "Zg==");
+    EXPECT_EQ(of("fo"), "Zm8=");
+    EXPECT_EQ(of("foobar"), "Zm9vYmFy");
+}
+
+TEST(Report, IsOnePageWithEveryNameEscaped) {
+    const std::string evil = "<script>\"x\"&'";
+    ReportContent content;
+    content.title = evil;
+    content.warnings = {evil};
+    content.facts = {{evil, evil}};
+    content.pictures = {{cv::Mat3b(4, 4, cv::Vec3b(1, 2, 3)), evil, evil}};
+    content.lights.resize(2);
+    content.lights[0].file = content.lights[1].file = evil;
+    content.lights[1].used = false;
+    content.ball = ReportBall{cv::Mat3b(9, 9, cv::Vec3b(0, 0, 0)), {{4, 4, 3, 1}}, {{evil, Highlight{4, 4}}}};
+    content.exposure_histogram = {0.5, 0.25, 0.25};
+    content.timings = {{evil, 1.5}};
+    const std::string page = report_html(content);
+    EXPECT_EQ(page.find("<script"), std::string::npos);
+    EXPECT_THAT(page, HasSubstr("&lt;script&gt;&quot;x&quot;&amp;&#39;"));
+    EXPECT_THAT(page, HasSubstr("data:image/png;base64,iVBOR"));
+    EXPECT_EQ(page.find("http"), std::string::npos) << "nothing may be loaded from elsewhere";
 }
 
 }  // namespace
