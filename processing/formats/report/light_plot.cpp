@@ -13,6 +13,7 @@ namespace {
 constexpr double radius = 170;  // of the 90 degree rim, SVG units
 constexpr double half = 200;
 constexpr double shown_sigmas = 10;
+constexpr std::size_t most_numbered = 32;  // beyond, numbers would cover each other; names are still shown on hover
 
 struct Place {
     double x = 0;
@@ -33,16 +34,19 @@ std::string ring(double degrees) {
                        degrees);
 }
 
-std::string mark(const Light& light, std::size_t number) {
+std::string number_beside(const Place& p, std::size_t number) {
+    return fmt::format("<text class='label' x='{:.2f}' y='{:.2f}'>{}</text>", p.x + 8, p.y - 6, number);
+}
+
+std::string mark(const Light& light, const std::string& label, double size) {
     const Place p = place_of(light.direction);
     const double sigma = std::max(light.sigma_deg * shown_sigmas / 90.0 * radius, 0.0);
     const std::string uncertainty =
         sigma > 0 ? fmt::format("<circle class='sigma' cx='{:.2f}' cy='{:.2f}' r='{:.2f}'/>", p.x, p.y, sigma) : "";
     return fmt::format(
         "<g class='{}'><title>{}: {:.1f}° off the camera's axis</title>{}<circle class='lamp' cx='{:.2f}' cy='{:.2f}' "
-        "r='5'/><text class='label' x='{:.2f}' y='{:.2f}'>{}</text></g>",
-        light.used ? "used" : "unused", escaped(light.file), p.off_axis_deg, uncertainty, p.x, p.y, p.x + 8, p.y - 6,
-        number);
+        "r='{}'/>{}</g>",
+        light.used ? "used" : "unused", escaped(light.file), p.off_axis_deg, uncertainty, p.x, p.y, size, label);
 }
 
 }  // namespace
@@ -54,7 +58,9 @@ std::string light_plot(const Lights& lights) {
     svg += fmt::format("<line class='grid' x1='-{0}' x2='{0}'/><line class='grid' y1='-{0}' y2='{0}'/>", radius);
     svg += fmt::format("<text class='tick' x='{}' y='14'>x</text><text class='tick' x='6' y='-{}'>y</text>", radius + 8,
                        radius + 14);
-    for (std::size_t i = 0; i < lights.size(); ++i) svg += mark(lights[i], i + 1);
+    const bool numbered = lights.size() <= most_numbered;
+    for (std::size_t i = 0; i < lights.size(); ++i)
+        svg += mark(lights[i], numbered ? number_beside(place_of(lights[i].direction), i + 1) : "", numbered ? 5 : 3);
     return svg + "</svg>";
 }
 

@@ -141,6 +141,30 @@ TEST_F(ReadPicture, DamagedPngIsTold) {
     EXPECT_THAT(input_error_of([&] { read_picture(file("bad.png", bytes)); }), HasSubstr("checksum"));
 }
 
+/// Whatever the bytes: a picture or an InputError, never another exception or a crash.
+TEST_F(ReadPicture, DamageAnywhereIsAPictureOrAnInputError) {
+    write_exr(folder_.path() / "a.exr", cv::Mat3f(40, 60, cv::Vec3f(0.5F, 2.0F, 0.25F)));
+    const cv::Mat image = gradient<uchar>(CV_8UC3, 255);
+    const std::vector<std::vector<std::byte>> originals{encoded(".png", image), encoded(".jpg", image),
+                                                        encoded(".tiff", image), read_file(folder_.path() / "a.exr")};
+    std::uint32_t state = 1;
+    const auto random = [&state](std::size_t below) {  // Numerical Recipes' generator
+        state = state * 1664525U + 1013904223U;
+        return static_cast<std::size_t>(state >> 8) % below;
+    };
+    for (const auto& original : originals)
+        for (int round = 0; round < 200; ++round) {
+            auto bytes = original;
+            for (int k = 0; k < 4; ++k)
+                bytes[4 + random(std::min<std::size_t>(bytes.size() - 4, 600))] = std::byte(random(256));
+            try {
+                decode_picture(bytes, "damaged");
+            } catch (const InputError&) {
+                continue;
+            }
+        }
+}
+
 TEST_F(ReadPicture, MissingEmptyAndForeignFilesAreNamed) {
     EXPECT_THAT(input_error_of([&] { read_picture(folder_.path() / "none.png"); }), HasSubstr("does not exist"));
     EXPECT_THAT(input_error_of([&] { read_picture(folder_.path()); }), HasSubstr("is not a file"));
