@@ -1,8 +1,11 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <iterator>
 
 #include "acquisition/frame/error.h"
+#include "processing/calibration/warnings.h"
 #include "processing/formats/calibration_file.h"
 #include "processing/formats/json_file.h"
 #include "processing/formats/light_files.h"
@@ -80,6 +83,26 @@ CalibrationOptions with_imported(const Session& session, CalibrationOptions opti
     return options;
 }
 
+/// A lamp that cannot be read is either left out on purpose or an error: results never rest on fewer lamps than the
+/// user knows of.
+void require_highlights(const Calibration& calibration, const std::vector<std::string>& dropped) {
+    std::vector<std::string> unread;
+    for (std::size_t i = 0; i < calibration.lights.size(); ++i) {
+        const std::string& file = calibration.lights[i].file;
+        if (!calibration.highlights[i] && std::find(dropped.begin(), dropped.end(), file) == dropped.end())
+            unread.push_back(file);
+    }
+    if (unread.empty()) return;
+    throw InputError(
+        fmt::format("the ball shows no usable highlight of the lamp in {}", fmt::join(unread, ", ")),
+        fmt::format("leave such a frame out with --drop {}, or read its highlight by hand with --highlight {}=X,Y",
+                    unread[0], unread[0]));
+}
+
+void append(std::vector<std::string>& to, std::vector<std::string> more) {
+    to.insert(to.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
+}
+
 void warn_of_few_lights(Calibration& calibration) {
     const auto used =
         std::count_if(calibration.lights.begin(), calibration.lights.end(), [](const Light& l) { return l.used; });
@@ -107,10 +130,12 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
         summary.seconds.read = watch.lap();
         step(work, {"calibrating lights", 0, 1, "ball and highlights"});
         summary.calibration = calibrate(ball.frames, ball.files, with_imported(session, options.calibration));
+        require_highlights(summary.calibration, options.calibration.drop);
         summary.seconds.solve = watch.lap();
         const BallView view = view_of_balls(ball.frames, summary.calibration.balls);
         write_png(files.ball_picture, draw_balls(view, summary.calibration));
     }
+    if (options.from || given) append(summary.calibration.warnings, warnings_about(summary.calibration));
     warn_of_few_lights(summary.calibration);
     write_calibration(files.calibration, summary.calibration, lamps_of(lit));
     write_lp(files.lights_lp, summary.calibration.lights);

@@ -1,6 +1,11 @@
-#include "rig/cli/command_line.h"
+#include "rig/cli/commands.h"
 
 int main(int argc, char** argv) {
     darkbox::CommandLine line;
+    darkbox::add_import_command(line);
+    darkbox::add_stage_commands(line);
+    darkbox::add_relight_command(line);
+    darkbox::add_transfer_command(line);
+    darkbox::add_session_commands(line);
     return line.run(argc, argv);
 }

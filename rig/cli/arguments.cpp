@@ -1,0 +1,89 @@
+#include "rig/cli/arguments.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+
+#include "acquisition/frame/error.h"
+#include "processing/formats/atomic_file.h"
+#include "processing/formats/exr.h"
+#include "processing/formats/png.h"
+#include "processing/formats/srgb.h"
+
+namespace darkbox {
+namespace {
+
+constexpr double shortest_direction = 1e-6;
+constexpr int jpeg_quality = 95;
+
+[[noreturn]] void malformed(const std::string& option, const std::string& text, const std::string& form) {
+    throw InputError(fmt::format("{} '{}' is not of the form {}", option, text, form), "see --help for an example");
+}
+
+}  // namespace
+
+std::vector<double> parse_numbers(const std::string& option, const std::string& text, std::size_t count) {
+    std::vector<double> numbers;
+    const char* at = text.data();
+    const char* const end = at + text.size();
+    while (at <= end) {
+        double number = 0;
+        const auto [next, error] = std::from_chars(at, end, number);
+        if (error != std::errc() || !std::isfinite(number) || (next != end && *next != ',')) break;
+        numbers.push_back(number);
+        if (next == end) {
+            if (numbers.size() == count) return numbers;
+            break;
+        }
+        at = next + 1;
+    }
+    malformed(option, text, fmt::format("of {} numbers with commas between them", count));
+}
+
+Ball parse_ball(const std::string& text) {
+    const auto n = parse_numbers("--ball", text, 3);
+    return {n[0], n[1], n[2], 1.0};
+}
+
+std::pair<std::string, cv::Point2d> parse_highlight(const std::string& text) {
+    const auto equals = text.rfind('=');
+    if (equals == std::string::npos || equals == 0) malformed("--highlight", text, "FRAME=X,Y");
+    const auto n = parse_numbers("--highlight", text.substr(equals + 1), 2);
+    return {text.substr(0, equals), {n[0], n[1]}};
+}
+
+Light parse_light(const std::string& text) {
+    const auto at = text.find('@');
+    const auto d = parse_numbers("--light", text.substr(0, at), 3);
+    Light light;
+    light.file = text;
+    light.direction = {d[0], d[1], d[2]};
+    if (light.direction.norm() < shortest_direction)
+        throw InputError(fmt::format("--light '{}' has no direction", text),
+                         "give a vector from the object to the light");
+    light.direction.normalize();
+    if (at != std::string::npos) {
+        const auto i = parse_numbers("--light", text.substr(at + 1), 3);
+        light.intensity = {i[0], i[1], i[2]};
+        if ((light.intensity.array() < 0).any())
+            throw InputError(fmt::format("--light '{}' has a negative intensity", text), "intensities are 0 or more");
+    }
+    return light;
+}
+
+void write_relit(const std::filesystem::path& path, const cv::Mat3f& linear, double gain) {
+    const std::string extension = path.extension().string();
+    if (extension == ".exr") {
+        write_exr(path, linear);
+    } else if (extension == ".png") {
+        write_png(path, viewable(linear, gain));
+    } else if (extension == ".jpg" || extension == ".jpeg") {
+        write_file(path, encode_jpeg(viewable(linear, gain), jpeg_quality));
+    } else {
+        throw InputError(fmt::format("'{}' is not a picture darkbox writes", path.string()),
+                         "end the name in .png, .jpg or .exr (linear float)");
+    }
+}
+
+}  // namespace darkbox

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "processing/calibration/calibration.h"
+#include "processing/maps/lights.h"
+
+namespace darkbox {
+
+// What people write on the command line, as the types that stages take. Each throws InputError that quotes the argument
+// and says the form that is expected.
+
+/// "1,2,3": exactly `count` finite numbers.
+std::vector<double> parse_numbers(const std::string& option, const std::string& text, std::size_t count);
+
+/// "X,Y,R" in pixels.
+Ball parse_ball(const std::string& text);
+
+/// "FRAME=X,Y".
+std::pair<std::string, cv::Point2d> parse_highlight(const std::string& text);
+
+/// "X,Y,Z" of any length but zero, or "X,Y,Z@R,G,B" with an intensity per channel; the direction is made unit length.
+Light parse_light(const std::string& text);
+
+/// Writes a linear picture: EXR as it is; PNG, JPEG or TIFF sRGB-encoded in 8 bits. Other extensions are an InputError.
+void write_relit(const std::filesystem::path& path, const cv::Mat3f& linear, double gain);
+
+}  // namespace darkbox

@@ -1,0 +1,69 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "processing/pipeline/import.h"
+#include "rig/cli/arguments.h"
+#include "rig/cli/commands.h"
+
+namespace darkbox {
+namespace {
+
+constexpr std::string_view warning_prefix = "warning: ";
+
+struct Arguments {
+    ImportOptions options;
+    std::string ball;
+};
+
+CommandResult run(const Arguments& arguments, const WorkContext& work) {
+    ImportOptions options = arguments.options;
+    if (!arguments.ball.empty()) options.ball = parse_ball(arguments.ball);
+    const Session session = import_photographs(options, work);
+
+    CommandResult result;
+    Json notes = Json::array();
+    for (const std::string& note : session.info().notes) {
+        if (note.starts_with(warning_prefix))
+            result.warnings.push_back(note.substr(warning_prefix.size()));
+        else
+            notes.push_back(note);
+    }
+    result.json = {{"session", session.folder().string()},
+                   {"object", session.info().object},
+                   {"frames", session.frames().size()},
+                   {"notes", notes}};
+    result.text = fmt::format("{}: {} frames, sealed. Next: darkbox process {}", session.folder().string(),
+                              session.frames().size(), session.folder().string());
+    return result;
+}
+
+}  // namespace
+
+void add_import_command(CommandLine& line) {
+    const auto a = std::make_shared<Arguments>();
+    CLI::App& command =
+        line.add("import", "Make a sealed session of photographs from any camera",
+                 "darkbox import photos --ball-images ball --mask photos/mask.png --transfer linear --out s",
+                 [a](const WorkContext& work) { return run(*a, work); });
+    command
+        .add_option("folders", a->options.folders, "Folders of photographs: plain, DiLiGenT, or RTI with an .lp file")
+        ->required();
+    command.add_option("--out", a->options.out, "Folder of the new session")->required();
+    command.add_option("--object", a->options.object, "Name of the object; default: the first folder's name");
+    command.add_option("--ball-images", a->options.ball_images, "Folder with a mirror ball under the same lamps");
+    command.add_option("--ball", a->ball, "The ball's outline, pixels: X,Y,R");
+    command.add_option("--ball-mask", a->options.ball_mask, "Picture that is white on the ball");
+    command.add_option("--mask", a->options.mask, "Picture that is white on the object");
+    command.add_option("--lights", a->options.lights, "Light directions: .lp, counted or bare x y z lines");
+    const std::map<std::string, ImportTransfer> transfers{
+        {"auto", ImportTransfer::automatic}, {"linear", ImportTransfer::linear}, {"srgb", ImportTransfer::srgb}};
+    command.add_option("--transfer", a->options.transfer, "Transfer curve: auto, linear, srgb")
+        ->transform(CLI::CheckedTransformer(transfers).description("{auto,linear,srgb}"));
+    const std::map<std::string, ImportLayout> layouts{
+        {"auto", ImportLayout::automatic}, {"plain", ImportLayout::plain}, {"diligent", ImportLayout::diligent}};
+    command.add_option("--format", a->options.layout, "Layout of the folders: auto, plain, diligent")
+        ->transform(CLI::CheckedTransformer(layouts).description("{auto,plain,diligent}"));
+}
+
+}  // namespace darkbox

@@ -1,0 +1,36 @@
+#include "rig/cli/relight_options.h"
+
+#include <numbers>
+
+namespace darkbox {
+
+void add_relight_options(CLI::App& command, RelightArguments& a) {
+    command.add_option("--light", a.lights, "Vector to a light, viewer frame: X,Y,Z or X,Y,Z@R,G,B; may be repeated")
+        ->expected(1)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    command.add_option("--environment", a.environments, "Light probe, equirectangular .hdr or .exr")
+        ->expected(1)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    command.add_option("--yaw", a.yaw_deg, "Turns the environment about the upright axis, degrees")
+        ->capture_default_str();
+    const std::map<std::string, ReflectanceModel> models{{"lambert", ReflectanceModel::lambert},
+                                                         {"phong", ReflectanceModel::phong}};
+    command.add_option("--model", a.options.model, "lambert or phong")
+        ->transform(CLI::CheckedTransformer(models).description("{lambert,phong}"));
+    const std::map<std::string, Lookup> lookups{{"thesis", Lookup::thesis}, {"detail", Lookup::detail}};
+    command
+        .add_option("--lookup", a.options.lookup, "thesis: the texel's radiance; detail: scaled by the pixel's albedo")
+        ->transform(CLI::CheckedTransformer(lookups).description("{thesis,detail}"));
+    command.add_option("--specular", a.options.phong_specular, "Phong's k_s, 0 to 1")->capture_default_str();
+    command.add_option("--exponent", a.options.phong_exponent, "Phong's exponent, 1 to 1000")->capture_default_str();
+    command.add_option("--exposure", a.options.exposure, "Factor on the result")->capture_default_str();
+}
+
+RelightOptions relight_options(const RelightArguments& arguments) {
+    RelightOptions options = arguments.options;
+    options.environment_yaw = arguments.yaw_deg * std::numbers::pi / 180;
+    options.validate();
+    return options;
+}
+
+}  // namespace darkbox

@@ -1,0 +1,168 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "processing/pipeline/stages.h"
+#include "processing/pipeline/summary_json.h"
+#include "rig/cli/arguments.h"
+#include "rig/cli/commands.h"
+
+namespace darkbox {
+namespace {
+
+struct Arguments {
+    std::filesystem::path session;
+    ProcessOptions options;
+    std::string ball;
+    std::filesystem::path from;
+    std::vector<std::string> highlights;
+};
+
+/// The arguments as options, and those that need parsing parsed.
+ProcessOptions options_of(const Arguments& arguments) {
+    ProcessOptions options = arguments.options;
+    CalibrationOptions& calibration = options.calibrate.calibration;
+    if (!arguments.ball.empty()) calibration.ball = parse_ball(arguments.ball);
+    if (!arguments.from.empty()) options.calibrate.from = arguments.from;
+    for (const std::string& text : arguments.highlights) calibration.highlights.push_back(parse_highlight(text));
+    return options;
+}
+
+std::string describe(const CalibrateSummary& summary) {
+    const Calibration& c = summary.calibration;
+    const auto used = std::count_if(c.lights.begin(), c.lights.end(), [](const Light& light) { return light.used; });
+    std::string text = fmt::format("{} of {} lights read ({}), condition number {:.2f}", used, c.lights.size(),
+                                   c.method, c.condition_number);
+    for (const Ball& ball : c.balls)
+        text += fmt::format("\nball at ({:.1f}, {:.1f}), radius {:.1f} px", ball.x, ball.y, ball.radius);
+    return text;
+}
+
+std::string describe(const NormalsSummary& summary) {
+    std::string text =
+        fmt::format("{} pixels from {} photographs ({}), residual {:.4f} of full scale, {:.2f} s", summary.pixels,
+                    summary.images, summary.solver, summary.residual_rms, summary.seconds.solve);
+    if (summary.mean_angular_error_deg)
+        text += fmt::format("\nmean angular error against the truth that came with the pictures: {:.2f} degrees",
+                            *summary.mean_angular_error_deg);
+    return text;
+}
+
+std::string describe(const TexelsSummary& summary) {
+    return fmt::format("{} texels explain {:.1f} % of the variance", summary.texels, 100 * summary.variance_explained);
+}
+
+std::string describe(const ShadeSummary& summary) {
+    return fmt::format("shading maps of {} texels at {} levels from {} samples", summary.texels, summary.levels,
+                       summary.samples);
+}
+
+std::string describe(const ReportSummary& summary) { return fmt::format("report: {}", summary.file.string()); }
+
+std::vector<std::string> warnings_of(const CalibrateSummary& summary) { return summary.calibration.warnings; }
+std::vector<std::string> warnings_of(const NormalsSummary& summary) { return summary.warnings; }
+std::vector<std::string> warnings_of(const TexelsSummary&) { return {}; }
+std::vector<std::string> warnings_of(const ShadeSummary&) { return {}; }
+/// Those of the whole session are in the report; the stages that found them said them already.
+std::vector<std::string> warnings_of(const ReportSummary&) { return {}; }
+
+template <class Summary>
+CommandResult result_of(const Summary& summary) {
+    return {to_json(summary), describe(summary), warnings_of(summary)};
+}
+
+CommandResult result_of(const ProcessSummary& summary) {
+    CommandResult result;
+    result.json = to_json(summary);
+    const auto append = [&result](const auto& stage) {
+        result.text += (result.text.empty() ? "" : "\n") + describe(stage);
+        for (const std::string& warning : warnings_of(stage)) result.warnings.push_back(warning);
+    };
+    append(summary.calibrate);
+    append(summary.normals);
+    append(summary.texels);
+    append(summary.shade);
+    append(summary.report);
+    return result;
+}
+
+void add_calibrate_options(CLI::App& command, Arguments& a) {
+    CalibrationOptions& calibration = a.options.calibrate.calibration;
+    command.add_option("--ball", a.ball, "The ball's outline, pixels: X,Y,R (else it is found)");
+    command.add_option("--drop", calibration.drop, "Frames to leave out");
+    command.add_option("--highlight", a.highlights, "A highlight read by hand: FRAME=X,Y");
+    command.add_option("--from", a.from, "Reuse the lights of this lights.json or session");
+    const std::map<std::string, CalibrationMethod> methods{{"refined", CalibrationMethod::refined},
+                                                           {"brightest", CalibrationMethod::brightest}};
+    command.add_option("--method", calibration.method, "refined, or brightest: the plain method of the thesis")
+        ->transform(CLI::CheckedTransformer(methods).description("{refined,brightest}"));
+}
+
+void add_normals_options(CLI::App& command, Arguments& a) {
+    const std::map<std::string, Solver> solvers{{"lsq", Solver::lsq}};
+    command.add_option("--solver", a.options.normals.solver, "lsq: least squares over all lights")
+        ->transform(CLI::CheckedTransformer(solvers).description("{lsq}"));
+}
+
+void add_texels_options(CLI::App& command, Arguments& a) {
+    TexelOptions& texels = a.options.texels;
+    command.add_option("--albedo-clusters", texels.albedo_clusters, "k of the first step")->capture_default_str();
+    command
+        .add_option("--neighbourhood-clusters", texels.neighbourhood_clusters, "k of the second step, in each group")
+        ->capture_default_str();
+    command.add_option("--window", texels.window, "Side of the neighbourhood, pixels, odd")->capture_default_str();
+}
+
+void add_shade_options(CLI::App& command, Arguments& a) {
+    command.add_option("--levels", a.options.shading.levels, "Levels of the rendering coefficient")
+        ->capture_default_str();
+}
+
+/// A command over one session. `stage` takes (Session, ProcessOptions, WorkContext).
+template <class Stage>
+CLI::App& add_stage(CommandLine& line, const std::string& name, const std::string& description,
+                    const std::shared_ptr<Arguments>& a, Stage stage) {
+    CLI::App& command =
+        line.add(name, description, fmt::format("darkbox {} s", name), [a, stage](const WorkContext& work) {
+            return result_of(stage(Session::open(a->session), options_of(*a), work));
+        });
+    command.add_option("session", a->session, "The session's folder")->required();
+    return command;
+}
+
+}  // namespace
+
+void add_stage_commands(CommandLine& line) {
+    const auto a = std::make_shared<Arguments>();
+    add_calibrate_options(add_stage(line, "calibrate", "Read the light directions off the mirror ball", a,
+                                    [](const Session& s, const ProcessOptions& o, const WorkContext& w) {
+                                        return run_calibrate(s, o.calibrate, w);
+                                    }),
+                          *a);
+    add_normals_options(add_stage(line, "normals", "Photometric stereo: normals and unshaded albedo", a,
+                                  [](const Session& s, const ProcessOptions& o, const WorkContext& w) {
+                                      return run_normals(s, o.normals, w);
+                                  }),
+                        *a);
+    add_texels_options(add_stage(line, "texels", "Cluster the unshaded picture into texels", a,
+                                 [](const Session& s, const ProcessOptions& o, const WorkContext& w) {
+                                     return run_texels(s, o.texels, w);
+                                 }),
+                       *a);
+    add_shade_options(add_stage(line, "shade", "Shading maps: each texel's radiance against the light", a,
+                                [](const Session& s, const ProcessOptions& o, const WorkContext& w) {
+                                    return run_shade(s, o.shading, w);
+                                }),
+                      *a);
+    add_stage(line, "report", "Write the session's report.html", a,
+              [](const Session& s, const ProcessOptions&, const WorkContext& w) { return run_report(s, w); });
+    CLI::App& process =
+        add_stage(line, "process", "All stages in order, then the report", a,
+                  [](const Session& s, const ProcessOptions& o, const WorkContext& w) { return run_process(s, o, w); });
+    add_calibrate_options(process, *a);
+    add_normals_options(process, *a);
+    add_texels_options(process, *a);
+    add_shade_options(process, *a);
+}
+
+}  // namespace darkbox

@@ -1,0 +1,145 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "acquisition/frame/error.h"
+#include "processing/formats/environment_file.h"
+#include "processing/formats/map_files.h"
+#include "processing/formats/picture.h"
+#include "processing/formats/png.h"
+#include "processing/formats/srgb.h"
+#include "processing/pipeline/stages.h"
+#include "processing/transfer/transfer.h"
+#include "rig/cli/arguments.h"
+#include "rig/cli/commands.h"
+#include "rig/cli/relight_options.h"
+
+namespace darkbox {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Arguments {
+    fs::path source;
+    fs::path source_normals;
+    fs::path source_albedo;
+    fs::path source_mask;
+    fs::path target;
+    fs::path target_mask;
+    fs::path out;
+    TransferOptions options;
+    RelightArguments relight;
+};
+
+/// The source's maps, and its shading maps where it is a session: only then can the target be relit.
+struct Source {
+    TransferSource maps;
+    std::optional<ShadingMaps> shading;
+};
+
+Source load_source(const Arguments& a) {
+    const bool plain = !a.source_normals.empty() || !a.source_albedo.empty();
+    if (plain == !a.source.empty())
+        throw InputError("transfer needs one source",
+                         "give --source SESSION, or --source-normals FILE and --source-albedo FILE");
+    if (!plain) {
+        RelightScene scene = load_scene(Session::open(a.source));
+        return {{std::move(scene.normals), std::move(scene.albedo), std::move(scene.index)}, std::move(scene.shading)};
+    }
+    if (a.source_normals.empty() || a.source_albedo.empty())
+        throw InputError("a source of plain maps needs both maps",
+                         "give --source-normals FILE and --source-albedo FILE");
+    const cv::Mat1b mask = a.source_mask.empty() ? cv::Mat1b() : read_mask(a.source_mask);
+    TransferSource maps;
+    maps.normals = mask.empty() ? read_normal_map(a.source_normals) : read_normal_map(a.source_normals, mask);
+    maps.albedo = read_albedo_map(a.source_albedo, mask.empty() ? maps.normals.valid : mask);
+    return {std::move(maps), std::nullopt};
+}
+
+NormalMap load_target(const Arguments& a) {
+    if (fs::is_directory(a.target)) return load_scene(Session::open(a.target)).normals;
+    return a.target_mask.empty() ? read_normal_map(a.target) : read_normal_map(a.target, read_mask(a.target_mask));
+}
+
+/// relit-1.png, relit-2.png, ... one for each light, then one for each environment.
+std::vector<fs::path> write_relit_pictures(const Arguments& a, const RelightScene& scene, const WorkContext& work) {
+    const RelightOptions options = relight_options(a.relight);
+    const double gain = viewing_gain(scene.albedo.albedo, scene.albedo.valid);
+    std::vector<fs::path> written;
+    const auto write = [&](const RelightResult& relit) {
+        written.push_back(a.out / fmt::format("relit-{}.png", written.size() + 1));
+        write_relit(written.back(), relit.image, gain);
+    };
+    for (const std::string& light : a.relight.lights) write(relight(scene, Lights{parse_light(light)}, options, work));
+    for (const std::string& file : a.relight.environments) write(relight(scene, read_environment(file), options, work));
+    return written;
+}
+
+CommandResult run(const Arguments& a, const WorkContext& work) {
+    const bool relit_wanted = !a.relight.lights.empty() || !a.relight.environments.empty();
+    for (const std::string& light : a.relight.lights) parse_light(light);  // refuse a typing error before the long work
+    const Source source = load_source(a);
+    if (relit_wanted && !source.shading)
+        throw InputError("plain maps cannot be relit: they have no shading maps",
+                         "use a processed session as --source");
+    const NormalMap target = load_target(a);
+    const TransferResult moved = transfer_texture(source.maps, target, a.options, work);
+
+    write_png(a.out / "albedo.png",
+              viewable(moved.albedo.albedo, viewing_gain(source.maps.albedo.albedo, source.maps.albedo.valid)));
+    write_albedo_map(a.out / "albedo.exr", moved.albedo);
+    write_coordinates(a.out / "coordinates.png", moved.coordinates);
+    if (moved.index.texels > 0) write_index_map(a.out / "index.png", moved.index);
+    std::vector<fs::path> relit;
+    if (relit_wanted) relit = write_relit_pictures(a, {target, moved.albedo, moved.index, *source.shading}, work);
+
+    CommandResult result;
+    result.json = {{"out", a.out.string()},
+                   {"seconds", moved.seconds},
+                   {"patch_energy", moved.patch_energy},
+                   {"coherence", moved.coherence},
+                   {"histogram_distance", moved.histogram_distance},
+                   {"coverage_deg", moved.coverage_deg},
+                   {"relit", Json::array()}};
+    for (const fs::path& path : relit) result.json["relit"].push_back(path.string());
+    constexpr double covered_deg = 15;
+    if (moved.coverage_deg > covered_deg)
+        result.warnings.push_back(
+            fmt::format("the source does not show all of the target's normals: 5 % of them are more than {:.0f} "
+                        "degrees from any of the source's",
+                        moved.coverage_deg));
+    result.text =
+        fmt::format("{}: {} x {} pixels in {:.1f} s, coherence {:.2f}, patch energy {:.1f}", a.out.string(),
+                    moved.coordinates.cols, moved.coordinates.rows, moved.seconds, moved.coherence, moved.patch_energy);
+    return result;
+}
+
+}  // namespace
+
+void add_transfer_command(CommandLine& line) {
+    const auto a = std::make_shared<Arguments>();
+    CLI::App& command =
+        line.add("transfer", "Move an object's texture onto another object (Image Analogies)",
+                 "darkbox transfer --source s --target other --out moved --light=-0.5,0.5,0.7 --environment sky.hdr",
+                 [a](const WorkContext& work) { return run(*a, work); });
+    command.add_option("--source", a->source, "Processed session whose texture is taken");
+    command.add_option("--source-normals", a->source_normals, "Or plain maps: normals as PNG or EXR");
+    command.add_option("--source-albedo", a->source_albedo, "  and unshaded colours");
+    command.add_option("--source-mask", a->source_mask, "  and a picture that is white on the object");
+    command.add_option("--target", a->target, "Processed session, or a normal map as PNG or EXR")->required();
+    command.add_option("--target-mask", a->target_mask, "White on the target, for a plain normal map");
+    command.add_option("--out", a->out, "Folder for albedo.png, index.png, coordinates.png, relit-*.png")->required();
+    command.add_option("--window", a->options.window, "Side of the window, pixels, odd")->capture_default_str();
+    command.add_option("--coarse-window", a->options.coarse_window, "Side of the window one level up, odd")
+        ->capture_default_str();
+    command.add_option("--kappa", a->options.kappa, "Hertzmann's coherence weight")->capture_default_str();
+    command.add_option("--normal-weight", a->options.normal_weight, "Weight of normals against albedo")
+        ->capture_default_str();
+    command.add_option("--sigma", a->options.normal_sigma, "Low-pass of the normals, pixels")->capture_default_str();
+    command.add_option("--seed", a->options.seed, "Seed of the random choices")->capture_default_str();
+    add_relight_options(command, a->relight);
+}
+
+}  // namespace darkbox

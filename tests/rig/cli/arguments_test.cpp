@@ -1,0 +1,44 @@
+#include "rig/cli/arguments.h"
+
+#include <gtest/gtest.h>
+
+#include "acquisition/frame/error.h"
+
+namespace darkbox {
+namespace {
+
+TEST(ParseNumbers, TakesExactlyTheCountAsked) {
+    EXPECT_EQ(parse_numbers("--x", "1,-2.5,3e2", 3), (std::vector<double>{1, -2.5, 300}));
+    for (const char* bad :
+         {"", "1", "1,2", "1,2,3,4", "1,2,", ",1,2", "1 ,2,3", "1,2,x", "1,2,nan", "1,2,inf", "1;2;3"})
+        EXPECT_THROW(parse_numbers("--x", bad, 3), InputError) << bad;
+}
+
+TEST(ParseLight, IsUnitLengthAndKeepsItsIntensity) {
+    const Light light = parse_light("0,3,4@1,0.5,0");
+    EXPECT_NEAR((light.direction - Eigen::Vector3d(0, 0.6, 0.8)).norm(), 0, 1e-15);
+    EXPECT_EQ(light.intensity, Eigen::Vector3d(1, 0.5, 0));
+    EXPECT_THROW(parse_light("0,0,0"), InputError);
+    EXPECT_THROW(parse_light("0,0,1@1,1,-1"), InputError);
+}
+
+TEST(ParseHighlight, SplitsAtTheLastEqualsSign) {
+    const auto [frame, at] = parse_highlight("odd=name.png=12.5,7");
+    EXPECT_EQ(frame, "odd=name.png");
+    EXPECT_EQ(at, cv::Point2d(12.5, 7));
+    EXPECT_THROW(parse_highlight("12,7"), InputError);
+    EXPECT_THROW(parse_highlight("=12,7"), InputError);
+}
+
+TEST(ParseBall, IsTrustedFully) {
+    const Ball ball = parse_ball("100.5,80,42");
+    EXPECT_EQ(ball.radius, 42);
+    EXPECT_EQ(ball.confidence, 1.0);
+}
+
+TEST(WriteRelit, RefusesAnEndingItDoesNotKnow) {
+    EXPECT_THROW(write_relit("picture.bmp", cv::Mat3f(2, 2, cv::Vec3f(1, 1, 1)), 1.0), InputError);
+}
+
+}  // namespace
+}  // namespace darkbox
