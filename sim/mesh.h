@@ -43,8 +43,8 @@ TriangleMesh tessellated(const ParametricSurface& surface, int cells_u, int cell
 /// A torus about the z axis through `centre`.
 struct Torus {
     Vec3 centre;
-    double ring_mm = 37.0;
-    double tube_mm = 17.0;
+    double ring_mm = 42.0;
+    double tube_mm = 20.0;
 };
 TriangleMesh torus_mesh(const Torus& torus);
 

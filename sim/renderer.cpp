@@ -16,6 +16,7 @@ namespace darkbox::sim {
 struct Renderer::Fragment {
     Vec3 position;
     Vec3 geometric_normal;
+    Vec3 smooth_normal;  ///< without the texture's relief
     Vec3 normal;
     Vec3 to_viewer;
     Rgb albedo;
@@ -86,12 +87,17 @@ Renderer::Fragment Renderer::box_fragment(const Ray& ray) const {
             nearest = &wall;
         }
     }
-    return {ray.origin + ray.direction * distance, nearest->normal, nearest->normal, -ray.direction, *nearest->albedo};
+    return {ray.origin + ray.direction * distance,
+            nearest->normal,
+            nearest->normal,
+            nearest->normal,
+            -ray.direction,
+            *nearest->albedo};
 }
 
 Renderer::Fragment Renderer::fragment(const Ray& ray, const std::optional<RayHit>& hit) const {
     if (!hit) return box_fragment(ray);
-    Fragment seen{hit->point.position, hit->geometric_normal, hit->normal, -ray.direction, {}};
+    Fragment seen{hit->point.position, hit->geometric_normal, hit->normal, hit->normal, -ray.direction, {}};
     if (hit->on_ball) {
         seen.albedo = scene_.ball->body;
         return seen;
@@ -119,7 +125,8 @@ Renderer::Sample Renderer::sample(const Ray& ray) const {
 Rgb Renderer::radiance(const Fragment& f, const SceneLamp& lamp) const {
     const Incidence light = incidence(scene_, lamp, f.position);
     const double cosine = dot(f.normal, light.direction);
-    if (cosine <= 0.0) return {};
+    // A relief turns normals only; what faces away from the lamp as a whole is in its own shadow.
+    if (cosine <= 0.0 || dot(f.smooth_normal, light.direction) <= 0.0) return {};
     if (tracer_.blocked({f.position + f.geometric_normal * shadow_offset_mm, light.direction}, light.distance_mm))
         return {};
     Rgb reflected = f.albedo * cosine;

@@ -15,17 +15,17 @@
 namespace darkbox::sim {
 namespace {
 
-constexpr double field_of_view_mm = 160.0;
+constexpr double field_of_view_mm = 200.0;
 constexpr double margin_mm = 4.0;
 
 /// Where objects stand: a little up and to the right, the ball being at the lower left.
-constexpr Vec3 object_centre{18, 3, 0};
+constexpr Vec3 object_centre{18, 4, 0};
 
 using Shapes = std::vector<std::variant<Sphere, TriangleMesh>>;
 
-Shapes sphere() { return {Sphere{object_centre, 50.0}}; }
+Shapes sphere() { return {Sphere{object_centre, 58.0}}; }
 
-Shapes torus() { return {torus_mesh({object_centre, 37.0, 17.0})}; }
+Shapes torus() { return {torus_mesh({object_centre, 42.0, 20.0})}; }
 
 /// The teapot upright, its spout to the right, turned a little and tilted so that the lid is seen.
 Shapes teapot() {
@@ -39,7 +39,7 @@ Shapes teapot() {
         return tilted(
             {up.x * std::cos(turn) + up.z * std::sin(turn), up.y, -up.x * std::sin(turn) + up.z * std::cos(turn)});
     };
-    Pose pose{in_viewer({1, 0, 0}), in_viewer({0, 1, 0}), in_viewer({0, 0, 1}), 18.5, {}};
+    Pose pose{in_viewer({1, 0, 0}), in_viewer({0, 1, 0}), in_viewer({0, 0, 1}), 22.0, {}};
     pose.shift = object_centre - in_viewer({0.22, 0.0, 1.5}) * pose.scale;
     Shapes shapes;
     for (const TriangleMesh& part : teapot_parts()) shapes.emplace_back(posed(part, pose));
@@ -49,6 +49,8 @@ Shapes teapot() {
 /// Rolling ground with an embossed rosette.
 Shapes relief() {
     HeightField field;
+    field.width_mm = 120.0;
+    field.height_mm = 116.0;
     field.height = [](double x, double y) {
         const double r = std::hypot(x, y);
         const double petals = std::cos(6.0 * std::atan2(y, x));
@@ -58,7 +60,7 @@ Shapes relief() {
     };
     TriangleMesh mesh = height_field_mesh(field, 480);
     Pose pose;
-    pose.shift = object_centre;
+    pose.shift = object_centre + Vec3{0, 0, 8};  // clear of the ball's shadow
     return {posed(std::move(mesh), pose)};
 }
 

@@ -73,9 +73,9 @@ TEST(Truth, FilesHoldWhatWasTrue) {
     EXPECT_EQ(lamps["frames"][1]["lamps"][0]["name"], "lamp-2");
     EXPECT_EQ(lamps["frames"][1]["lamps"][0]["share"], 1.0);
     const auto ball = nlohmann::json::parse(text_of(path / "ball.json"))["balls"][0];
-    EXPECT_NEAR(ball["radius"].get<double>(), 18.0 / 2.5, 1e-9);
-    EXPECT_NEAR(ball["x"].get<double>(), 22.0 / 2.5 - 0.5, 1e-9);
-    EXPECT_NEAR(ball["y"].get<double>(), 47.5 - 22.0 / 2.5, 1e-9);
+    EXPECT_NEAR(ball["radius"].get<double>(), 18.0 / 3.125, 1e-9);
+    EXPECT_NEAR(ball["x"].get<double>(), 22.0 / 3.125 - 0.5, 1e-9);
+    EXPECT_NEAR(ball["y"].get<double>(), 47.5 - 22.0 / 3.125, 1e-9);
 }
 
 TEST(Truth, AFolderThatCannotBeMadeIsNamed) {
