@@ -97,12 +97,12 @@ SessionInfo session_info(const RigDescription& rig, const CameraInfo& camera, co
     return info;
 }
 
-Session capture_session(const CaptureRequest& request, const RigDescription& rig, LampArray& lamps, Camera& camera,
-                        Clock& clock, const WorkContext& work) {
+CapturedSession capture_session(const CaptureRequest& request, const RigDescription& rig, LampArray& lamps,
+                                Camera& camera, Clock& clock, const WorkContext& work) {
     const DarkOnExit dark_on_exit(lamps);
     Begun begun = request.start == CaptureStart::create ? create(request, rig, camera) : resume(request, rig);
-    run_capture(begun.plan, rig, lamps, camera, clock, begun.writer, work);
-    return begun.writer.seal();
+    const CaptureSummary summary = run_capture(begun.plan, rig, lamps, camera, clock, begun.writer, work);
+    return {begun.writer.seal(), summary};
 }
 
 }  // namespace darkbox

@@ -20,6 +20,11 @@ struct CaptureRequest {
     CaptureStart start = CaptureStart::create;
 };
 
+struct CapturedSession {
+    Session session;  ///< sealed
+    CaptureSummary summary;
+};
+
 /// The head of a session of this plan, created now.
 SessionInfo session_info(const RigDescription& rig, const CameraInfo& camera, const std::string& object,
                          const CapturePlan& plan);
@@ -27,7 +32,7 @@ SessionInfo session_info(const RigDescription& rig, const CameraInfo& camera, co
 /// The whole capture: starts or resumes the session, keeps rig.toml in it, takes every shot, seals. Lamps are dark when
 /// it returns or throws; whatever was acknowledged stays and can be resumed. Throws what run_capture() throws, and
 /// InputError when an interrupted session was begun with another rig.toml or other lamps.
-Session capture_session(const CaptureRequest& request, const RigDescription& rig, LampArray& lamps, Camera& camera,
-                        Clock& clock, const WorkContext& work = {});
+CapturedSession capture_session(const CaptureRequest& request, const RigDescription& rig, LampArray& lamps,
+                                Camera& camera, Clock& clock, const WorkContext& work = {});
 
 }  // namespace darkbox

@@ -31,7 +31,7 @@ struct Bench {
     Session capture(CaptureStart start = CaptureStart::create) {
         WorkContext work;
         work.stop = stop.get_token();
-        return capture_session(request(start), rig, lamps, camera, clock, work);
+        return capture_session(request(start), rig, lamps, camera, clock, work).session;
     }
     /// What capture() says when it fails with this kind of error.
     template <typename Kind>

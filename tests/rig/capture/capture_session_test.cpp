@@ -99,8 +99,11 @@ TEST(CaptureSession, ResumeTakesOnlyWhatIsMissing) {
     std::vector<std::string> taken;
     WorkContext work;
     work.report = [&](const ProgressUpdate& update) { taken.push_back(update.detail); };
-    const Session session =
+    const auto [session, summary] =
         capture_session(bench.request(CaptureStart::resume), bench.rig, bench.lamps, bench.camera, bench.clock, work);
+    EXPECT_EQ(summary.resumed, 3);
+    EXPECT_EQ(summary.taken, 3);
+    EXPECT_EQ(summary.repeated, 0);
     EXPECT_THAT(taken, testing::ElementsAre("lamp-03", "lamp-04", "dark", ""));
     test::expect_every_frame_right(session, bench.rig);
     EXPECT_THAT(test::events_of(session), HasSubstr("resumed with 3 of 6 frames"));
@@ -122,7 +125,7 @@ TEST(CaptureSession, ResumesTheLampsItWasBegunWith) {
     request.lamps = {"lamp-01"};
     EXPECT_THROW(capture_session(request, bench.rig, bench.lamps, bench.camera, bench.clock), InputError);
     request.lamps = {};
-    const Session session = capture_session(request, bench.rig, bench.lamps, bench.camera, bench.clock);
+    const Session session = capture_session(request, bench.rig, bench.lamps, bench.camera, bench.clock).session;
     ASSERT_EQ(session.frames().size(), 4);
     EXPECT_EQ(session.frames()[1].lamp_name, "lamp-02");
     EXPECT_EQ(session.frames()[2].lamp_name, "lamp-04");
