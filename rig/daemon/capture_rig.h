@@ -1,0 +1,35 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "acquisition/frame/progress.h"
+#include "acquisition/frame/units.h"
+#include "rig/capture/capture_session.h"
+#include "rig/description/rig_description.h"
+
+namespace darkbox {
+
+/// A capture that ended with a sealed session.
+struct CaptureOutcome {
+    std::filesystem::path session;
+    std::size_t frames = 0;
+    int resumed = 0;   ///< shots that an earlier run had acknowledged
+    int repeated = 0;  ///< exposures thrown away and taken again
+    Seconds duration{0};
+};
+
+/// A rig with its devices open, reduced to what drives it: the daemon's capture thread, or `darkbox capture
+/// --standalone`. Its lamps are dark when it is made and when it is destroyed. Thread-compatible: one thread drives it.
+class CaptureRig {
+public:
+    virtual ~CaptureRig() = default;
+    /// The whole capture, sealed; throws what capture_session() throws. Lamps are dark afterwards.
+    virtual CaptureOutcome capture(const CaptureRequest& request, const WorkContext& work) = 0;
+    /// Throws DeviceError when darkness cannot be confirmed.
+    virtual void dark() = 0;
+};
+
+using OpenRig = std::function<std::unique_ptr<CaptureRig>()>;
+
+}  // namespace darkbox

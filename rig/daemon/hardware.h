@@ -1,0 +1,14 @@
+#pragma once
+
+#include <memory>
+
+#include "rig/daemon/capture_rig.h"
+
+namespace darkbox {
+
+/// Opens the devices that the description asks for; after a simulated capture, what is true of it lies in the session's
+/// truth/. The one place that knows the simulator and the real drivers at once. Throws InputError for a driver that
+/// this build does not have, DeviceError when a device cannot be opened.
+std::unique_ptr<CaptureRig> open_hardware(const RigDescription& rig);
+
+}  // namespace darkbox

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace darkbox {
+
+/// The folder that holds a rig's sessions, one folder each.
+struct SessionListing {
+    enum class State {
+        sealed,
+        interrupted,  ///< has a journal: resumes
+        damaged,      ///< looks like a session, but does not open
+    };
+    std::string name = {};  ///< of its folder
+    State state = State::sealed;
+    std::string object = {};
+    std::string created = {};  ///< ISO 8601, UTC
+    std::size_t frames = 0;
+    std::string problem = {};  ///< of a damaged one, in words
+};
+
+std::string name(SessionListing::State state);
+
+/// Sorted by name. Folders that are no sessions are left out; an absent folder holds none.
+std::vector<SessionListing> list_sessions(const std::filesystem::path& folder);
+
+/// The path of the session of this name. A name is 1 to 100 of A-Z a-z 0-9 . _ - and does not start with a dot, so it
+/// cannot leave the folder; anything else is an InputError.
+std::filesystem::path session_path(const std::filesystem::path& folder, const std::string& name);
+
+/// "vase-20261123-132854": the object's letters and digits and the moment, UTC; with "-2" and so on when that is taken.
+std::string fresh_session_name(const std::filesystem::path& folder, const std::string& object,
+                               std::chrono::system_clock::time_point now);
+
+/// $DARKBOX_SESSIONS, or ./sessions.
+std::filesystem::path default_sessions_folder();
+
+}  // namespace darkbox

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <filesystem>
+
+#include "rig/daemon/asio.h"
+
+namespace darkbox {
+
+/// A Unix socket in the file system that listens; only this user may connect (mode 0600 from the first moment on).
+/// The destructor removes the file if it is still its own. Thread-compatible.
+class SocketFile {
+public:
+    /// Replaces what a dead daemon left behind. Throws InputError when a live one answers there, or when something
+    /// else than a socket is in the way; DeviceError when the system refuses.
+    SocketFile(asio::io_context& io, std::filesystem::path path);
+    SocketFile(const SocketFile&) = delete;
+    SocketFile& operator=(const SocketFile&) = delete;
+    ~SocketFile();
+
+    UnixProtocol::acceptor& acceptor() { return acceptor_; }
+
+private:
+    std::filesystem::path path_;
+    UnixProtocol::acceptor acceptor_;
+    dev_t device_ = 0;
+    ino_t inode_ = 0;
+};
+
+}  // namespace darkbox
