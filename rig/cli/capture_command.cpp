@@ -1,0 +1,197 @@
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <sstream>
+
+#include "acquisition/device/device_error.h"
+#include "rig/cli/rig_commands.h"
+#include "rig/daemon/capture_order_json.h"
+#include "rig/daemon/client.h"
+#include "rig/daemon/hardware.h"
+#include "rig/daemon/session_folder.h"
+
+namespace darkbox {
+namespace {
+
+namespace fs = std::filesystem;
+using EventJson = DaemonClient::Json;
+
+struct Arguments {
+    fs::path rig;
+    int simulate = 0;  ///< lamps of the built-in simulated rig; 0 = not asked for
+    std::string object;
+    std::string plan = "all";
+    fs::path resume;
+    fs::path out;
+    fs::path socket;
+    bool standalone = false;
+};
+
+CommandResult captured(const std::string& folder, std::size_t frames, int repeated, int resumed, double seconds) {
+    CommandResult result;
+    result.json = {
+        {"session", folder}, {"frames", frames}, {"repeated", repeated}, {"resumed", resumed}, {"seconds", seconds}};
+    result.text =
+        fmt::format("{}: {} frames, sealed, in {:.1f} s. Next: darkbox process {}", folder, frames, seconds, folder);
+    if (repeated > 0) result.warnings.push_back(fmt::format("{} exposures had to be repeated", repeated));
+    return result;
+}
+
+// In this process.
+
+/// A session is resumed with the rig it was begun with, unless another is named.
+RigDescription rig_for(const Arguments& a, const CaptureRequest& request) {
+    if (!a.rig.empty()) return load_rig(a.rig);
+    if (a.simulate > 0) return parse_rig(simulated_rig_toml(a.simulate), "built-in simulated rig");
+    const fs::path kept = request.folder / "data" / "rig.toml";
+    if (request.start == CaptureStart::resume && fs::exists(kept)) return load_rig(kept);
+    throw InputError("no rig is given", "give --rig rig.toml, or --simulate 12 for a simulated rig");
+}
+
+CaptureRequest request_for(const Arguments& a) {
+    CaptureRequest request{.folder = a.out, .object = a.object, .lamps = lamps_of_plan(a.plan)};
+    const fs::path folder = default_sessions_folder();
+    if (!a.resume.empty()) {
+        request.start = CaptureStart::resume;
+        request.folder = fs::exists(a.resume) ? a.resume : folder / a.resume;
+    } else if (a.out.empty()) {
+        fs::create_directories(folder);
+        request.folder = folder / fresh_session_name(folder, a.object, std::chrono::system_clock::now());
+    }
+    return request;
+}
+
+CommandResult capture_here(const Arguments& a, const WorkContext& work) {
+    const CaptureRequest request = request_for(a);
+    const RigDescription description = rig_for(a, request);
+    const auto rig = open_hardware(description);
+    try {
+        const CaptureOutcome o = rig->capture(request, work);
+        return captured(o.session.string(), o.frames, o.repeated, o.resumed, o.duration.count());
+    } catch (const Cancelled& cancelled) {
+        throw Cancelled(std::string(cancelled.what()) + "; the lamps are dark",
+                        fmt::format("go on with: darkbox capture --standalone --resume {}", request.folder.string()));
+    }
+}
+
+// Through the daemon.
+
+/// Follows one capture from its acceptance to its last event.
+class FollowedCapture {
+public:
+    FollowedCapture(const DaemonClient& client, const EventJson& job, const WorkContext& work)
+        : client_(client), id_(job.at("id")), first_event_(job.at("event")), work_(work) {}
+
+    EventJson end() {
+        client_.follow_events(first_event_, {.event = [this](const EventJson& event) { return hear(event); },
+                                             .idle = [this] { cancel_if_asked(); }});
+        if (end_.is_null())
+            throw DeviceError("darkboxd stopped before the capture was done",
+                              "start it again, then darkbox sessions, and darkbox capture --resume SESSION");
+        return std::move(end_);
+    }
+
+private:
+    DaemonClient::Follow hear(const EventJson& event) {
+        cancel_if_asked();
+        if (event.value("capture", std::uint64_t{0}) != id_) return DaemonClient::Follow::go_on;
+        if (event.at("event") == "progress") {
+            work_.tell({event.at("stage"), event.at("done"), event.at("total"), event.at("detail")});
+            return DaemonClient::Follow::go_on;
+        }
+        end_ = event;
+        return DaemonClient::Follow::leave;
+    }
+
+    void cancel_if_asked() {
+        if (!work_.cancelled() || asked_) return;
+        asked_ = true;
+        client_.call("DELETE", fmt::format("captures/{}", id_));
+    }
+
+    const DaemonClient& client_;
+    const std::uint64_t id_;
+    const std::uint64_t first_event_;
+    const WorkContext& work_;
+    bool asked_ = false;
+    EventJson end_;
+};
+
+CaptureOrder order_for(const Arguments& a, const DaemonClient& client) {
+    CaptureOrder order{.object = a.object, .lamps = lamps_of_plan(a.plan)};
+    if (a.out.empty() && a.resume.empty()) return order;
+    const std::string folder = client.call("GET", "status").at("sessions");
+    if (!a.resume.empty()) order.resume = name_in_folder(a.resume, folder);
+    if (!a.out.empty()) order.name = name_in_folder(a.out, folder);
+    return order;
+}
+
+CommandResult capture_through(const DaemonClient& client, const Arguments& a, const WorkContext& work) {
+    const EventJson job = client.call("POST", "captures", to_json(order_for(a, client)));
+    const EventJson end = FollowedCapture(client, job, work).end();
+    if (end.at("event") == "done")
+        return captured(end.at("folder"), end.at("frames"), end.at("repeated"), end.at("resumed"), end.at("seconds"));
+    const std::string what = end.at("detail");
+    const std::string hint = end.at("hint");
+    if (end.at("event") == "cancelled") throw Cancelled(what + "; the lamps are dark", hint);
+    throw DeviceError(what, hint);
+}
+
+CommandResult run(const Arguments& a, const WorkContext& work) {
+    if (!a.resume.empty() && !(a.out.empty() && a.object.empty()))
+        throw InputError("a resumed session keeps its name and its object", "leave out --out and --object");
+    if (a.standalone) return capture_here(a, work);
+    const DaemonClient client(a.socket.empty() ? default_socket() : a.socket);
+    if (!client.answers())
+        throw InputError(fmt::format("no darkboxd answers at {}", client.socket().string()),
+                         "start it (darkboxd --config rig.toml), or capture in this process with --standalone");
+    if (!a.rig.empty() || a.simulate > 0)
+        throw InputError("darkboxd has its rig already", "leave out --rig and --simulate, or add --standalone");
+    return capture_through(client, a, work);
+}
+
+}  // namespace
+
+std::vector<std::string> lamps_of_plan(const std::string& plan) {
+    std::vector<std::string> lamps;
+    if (plan == "all") return lamps;
+    std::istringstream names(plan);
+    for (std::string name; std::getline(names, name, ',');) {
+        if (name.empty())
+            throw InputError(fmt::format("--plan \"{}\" holds an empty name", plan), "write lamp-01,lamp-02 or all");
+        lamps.push_back(name);
+    }
+    if (lamps.empty()) throw InputError("--plan names no lamp", "write lamp-01,lamp-02 or all");
+    return lamps;
+}
+
+std::string name_in_folder(const fs::path& session, const fs::path& folder) {
+    const fs::path plain = session.has_filename() ? session : session.parent_path();
+    if (!plain.has_parent_path() || fs::weakly_canonical(plain.parent_path()) == fs::weakly_canonical(folder))
+        return plain.filename().string();
+    throw InputError(fmt::format("{} is not in darkboxd's folder {}", session.string(), folder.string()),
+                     "give the session's name alone, or capture with --standalone");
+}
+
+void add_capture_command(CommandLine& line) {
+    const auto a = std::make_shared<Arguments>();
+    CLI::App& command =
+        line.add("capture", "Capture an object lamp by lamp, through darkboxd or in this process",
+                 "darkbox capture --object vase\n  darkbox capture --standalone --rig rig.toml --out vase",
+                 [a](const WorkContext& work) { return run(*a, work); });
+    auto* rig = command.add_option("--rig", a->rig, "The rig's description, with --standalone");
+    command.add_option("--simulate", a->simulate, "A simulated rig of this many lamps, with --standalone")
+        ->check(CLI::Range(3, 64))
+        ->excludes(rig);
+    command.add_option("--object", a->object, "Name of the object");
+    command.add_option("--plan", a->plan, "all, or names of lamps between commas");
+    command.add_option("--resume", a->resume, "Go on with this interrupted session");
+    command.add_option("--out", a->out, "The new session; default: made of object and date");
+    command.add_flag("--standalone", a->standalone, "Drive the rig in this process, without darkboxd");
+    command.add_option("--socket", a->socket, "Where darkboxd listens");
+}
+
+}  // namespace darkbox

@@ -1,0 +1,167 @@
+#include "rig/cli/rig_commands.h"
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <optional>
+
+#include "acquisition/device/device_error.h"
+#include "rig/capture/capture_run.h"
+#include "rig/daemon/client.h"
+#include "rig/daemon/session_folder.h"
+
+namespace darkbox {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Arguments {
+    fs::path rig;
+    fs::path socket;
+    fs::path folder;
+};
+
+DaemonClient client_for(const Arguments& a) { return DaemonClient(a.socket.empty() ? default_socket() : a.socket); }
+
+/// The daemon's answer, in the order in which Json prints.
+Json ask(const DaemonClient& client, const std::string& method, const std::string& target) {
+    return Json::parse(client.call(method, target).dump());
+}
+
+CommandResult rig_status(const Arguments& a) {
+    CommandResult result;
+    result.json = ask(client_for(a), "GET", "status");
+    result.text =
+        fmt::format("{}: {}, {} lamps, darkboxd {}", result.json.at("rig").get<std::string>(),
+                    result.json.at("state").get<std::string>(), result.json.at("lamps").at("count").get<int>(),
+                    result.json.at("version").get<std::string>());
+    if (result.json.contains("running")) {
+        const Json& job = result.json.at("running");
+        result.text += fmt::format("\ncapturing {}: {} of {}", job.at("session").get<std::string>(),
+                                   job.at("progress").at("done").get<int>(), job.at("progress").at("total").get<int>());
+    }
+    if (result.json.contains("problem")) result.warnings.push_back(result.json.at("problem"));
+    return result;
+}
+
+CommandResult rig_check(const Arguments& a) {
+    const RigDescription rig = load_rig(a.rig);
+    const CapturePlan plan = plan_capture(rig);
+    CommandResult result;
+    result.json = {{"rig", rig.name},
+                   {"camera", rig.camera.driver},
+                   {"lamps_driver", rig.lamps_driver},
+                   {"lamps", rig.lamps.size()},
+                   {"shots", plan.shots.size()}};
+    result.text = fmt::format("{} is valid: rig {}, {} {} lamps, {} camera, {} shots for all of them", a.rig.string(),
+                              rig.name, rig.lamps.size(), rig.lamps_driver, rig.camera.driver, plan.shots.size());
+    return result;
+}
+
+CommandResult lamps_list(const Arguments& a) {
+    CommandResult result;
+    result.json = ask(client_for(a), "GET", "lamps");
+    for (const Json& lamp : result.json.at("lamps")) {
+        const auto position = lamp.at("position_mm").get<std::array<double, 3>>();
+        result.text += fmt::format("{}{:<20} at {:8.1f} {:8.1f} {:8.1f} mm", result.text.empty() ? "" : "\n",
+                                   lamp.at("name").get<std::string>(), position[0], position[1], position[2]);
+    }
+    return result;
+}
+
+/// Waits until the daemon says that the lamps are dark: an accepted request is not yet darkness.
+CommandResult lamps_dark(const Arguments& a) {
+    const DaemonClient client = client_for(a);
+    const Json accepted = ask(client, "POST", "lamps/dark");
+    DaemonClient::Json told;
+    client.follow_events(accepted.at("event"), {.event = [&](const DaemonClient::Json& event) {
+                             if (event.at("event") != "lamps") return DaemonClient::Follow::go_on;
+                             told = event;
+                             return DaemonClient::Follow::leave;
+                         }});
+    if (told.is_null())
+        throw DeviceError("darkboxd stopped before it told whether the lamps are dark", "look at the lamps");
+    if (!told.at("dark")) throw DeviceError(told.at("detail"), "cut the lamps' supply");
+    CommandResult result;
+    result.json = {{"dark", true}};
+    result.text = told.at("detail");
+    return result;
+}
+
+Json describe(const SessionListing& session) {
+    return {{"name", session.name},       {"state", name(session.state)}, {"object", session.object},
+            {"created", session.created}, {"frames", session.frames},     {"problem", session.problem}};
+}
+
+Json sessions_on_disk(const fs::path& folder) {
+    Json list = Json::array();
+    for (const SessionListing& session : list_sessions(folder)) list.push_back(describe(session));
+    return {{"folder", folder.string()}, {"sessions", list}};
+}
+
+/// Those of the folder that was named; else the daemon's, where one answers; else those of the default folder.
+Json find_sessions(const Arguments& a) {
+    if (!a.folder.empty()) return sessions_on_disk(a.folder);
+    if (const auto socket = a.socket.empty() ? known_socket() : std::optional(a.socket)) {
+        const DaemonClient client(*socket);
+        if (client.answers()) return ask(client, "GET", "sessions");
+    }
+    return sessions_on_disk(default_sessions_folder());
+}
+
+CommandResult sessions(const Arguments& a) {
+    CommandResult result;
+    result.json = find_sessions(a);
+    const auto text = [](const Json& session, const char* key) { return session.value(key, std::string()); };
+    for (const Json& session : result.json.at("sessions")) {
+        result.text +=
+            fmt::format("{:<40} {:<12} {:>4} frames  {:<22} {}\n", text(session, "name"), text(session, "state"),
+                        session.at("frames").get<int>(), text(session, "created"), text(session, "object"));
+        if (const std::string problem = text(session, "problem"); !problem.empty())
+            result.warnings.push_back(fmt::format("{}: {}", text(session, "name"), problem));
+    }
+    if (result.text.empty()) result.text = fmt::format("no sessions in {}\n", text(result.json, "folder"));
+    result.text.pop_back();
+    return result;
+}
+
+using Run = CommandResult (*)(const Arguments&);
+
+struct Added {
+    CLI::App& command;
+    std::shared_ptr<Arguments> arguments;
+};
+
+Added add(CommandLine& line, CLI::App* group, const char* name, const char* description, const char* example, Run run) {
+    const auto a = std::make_shared<Arguments>();
+    return {line.add(name, description, example, [a, run](const WorkContext&) { return run(*a); }, group), a};
+}
+
+void add_to_daemon(CommandLine& line, CLI::App& group, const char* name, const char* description, const char* example,
+                   Run run) {
+    const auto [command, a] = add(line, &group, name, description, example, run);
+    command.add_option("--socket", a->socket, "Where darkboxd listens");
+}
+
+}  // namespace
+
+void add_rig_commands(CommandLine& line) {
+    CLI::App& rig = line.add_group("rig", "The rig as darkboxd sees it, and its description");
+    add_to_daemon(line, rig, "status", "What darkboxd is doing", "darkbox rig status", rig_status);
+    const auto [check, check_arguments] = add(line, &rig, "check", "Check a rig.toml without touching hardware",
+                                              "darkbox rig check --rig rig.toml", rig_check);
+    check.add_option("--rig", check_arguments->rig, "The rig's description")->required();
+
+    CLI::App& lamps = line.add_group("lamps", "The lamps of the rig");
+    add_to_daemon(line, lamps, "list", "Names and places of the lamps", "darkbox lamps list", lamps_list);
+    add_to_daemon(line, lamps, "dark", "Darken every lamp; a running capture is cancelled", "darkbox lamps dark",
+                  lamps_dark);
+
+    const auto [list, list_arguments] =
+        add(line, nullptr, "sessions", "The captured sessions", "darkbox sessions --folder sessions", sessions);
+    list.add_option("--socket", list_arguments->socket, "Where darkboxd listens");
+    list.add_option("--folder", list_arguments->folder,
+                    "Where they lie; default: darkboxd's folder when it runs, else $DARKBOX_SESSIONS, or ./sessions");
+}
+
+}  // namespace darkbox
