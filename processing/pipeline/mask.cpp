@@ -10,7 +10,8 @@
 namespace darkbox {
 namespace {
 
-constexpr double ball_margin = 1.08;  // of the radius: the ball's rim and its glow
+constexpr double ball_margin = 1.08;     // of the radius: the ball's rim and its glow
+constexpr double max_hole_share = 0.01;  // of the object's area
 
 /// The greatest luminance that each pixel showed under any lamp.
 cv::Mat1f brightest(const std::vector<cv::Mat3f>& images) {
@@ -36,17 +37,40 @@ void leave_out(cv::Mat1b& mask, const std::vector<cv::Vec3d>& discs) {
                    static_cast<int>(std::ceil(disc[2] * ball_margin)), cv::Scalar(0), cv::FILLED);
 }
 
-cv::Mat1b largest_part_filled(const cv::Mat1b& mask) {
-    std::vector<std::vector<cv::Point>> outlines;
-    cv::findContours(mask, outlines, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
-    const auto largest = std::max_element(outlines.begin(), outlines.end(), [](const auto& a, const auto& b) {
-        return cv::contourArea(a) < cv::contourArea(b);
-    });
-    if (largest == outlines.end())
+/// The parts of a mask, labelled from 1, and how many pixels each has; part 0 is where the mask is black.
+struct Parts {
+    explicit Parts(const cv::Mat1b& mask, int connectivity) {
+        cv::Mat1i statistics;
+        cv::Mat1d centroids;
+        const int count = cv::connectedComponentsWithStats(mask, label, statistics, centroids, connectivity, CV_32S);
+        for (int part = 0; part < count; ++part) areas.push_back(statistics(part, cv::CC_STAT_AREA));
+    }
+    cv::Mat1i label;
+    std::vector<int> areas;
+};
+
+cv::Mat1b largest_part(const cv::Mat1b& mask) {
+    const Parts parts(mask, 8);
+    const auto largest = std::max_element(parts.areas.begin() + 1, parts.areas.end());
+    if (largest == parts.areas.end())
         throw InputError("no object is told from the background in the photographs",
                          "give a mask (white on the object), or light the object better");
-    cv::Mat1b filled(mask.size(), uchar{0});
-    cv::drawContours(filled, outlines, static_cast<int>(largest - outlines.begin()), cv::Scalar(255), cv::FILLED);
+    cv::Mat1b part;
+    cv::compare(parts.label, static_cast<double>(largest - parts.areas.begin()), part, cv::CMP_EQ);
+    return part;
+}
+
+/// A small hole is a dark spot on the object; a large one shows the box behind it (a ring, a handle).
+cv::Mat1b with_small_holes_filled(const cv::Mat1b& mask) {
+    cv::Mat1b background;
+    cv::bitwise_not(mask, background);
+    const Parts holes(background, 4);
+    const double limit = max_hole_share * cv::countNonZero(mask);
+    cv::Mat1b filled = mask.clone();
+    for (int y = 0; y < mask.rows; ++y)
+        for (int x = 0; x < mask.cols; ++x)
+            if (const int hole = holes.label(y, x); hole > 0 && holes.areas[static_cast<std::size_t>(hole)] < limit)
+                filled(y, x) = 255;
     return filled;
 }
 
@@ -58,7 +82,7 @@ cv::Mat1b automatic_mask(const std::vector<cv::Mat3f>& images, const std::vector
     cv::threshold(encoded(brightest(images)), mask, 0, 255, cv::THRESH_BINARY | cv::THRESH_OTSU);
     leave_out(mask, without);
     cv::morphologyEx(mask, mask, cv::MORPH_OPEN, cv::getStructuringElement(cv::MORPH_ELLIPSE, {3, 3}));
-    return largest_part_filled(mask);
+    return with_small_holes_filled(largest_part(mask));
 }
 
 }  // namespace darkbox

@@ -84,6 +84,18 @@ TEST(AutomaticMask, IsTheBallWithoutTheMirrorBallBesideIt) {
     EXPECT_LT(cv::countNonZero(mask) - cv::countNonZero(both), 0.01 * cv::countNonZero(truth));
 }
 
+TEST(AutomaticMask, DarkSpotsBelongToTheObjectButAHoleDoesNot) {
+    cv::Mat3f image(100, 100, cv::Vec3f(0.003F, 0.003F, 0.003F));
+    cv::circle(image, {50, 50}, 40, cv::Scalar(0.5, 0.5, 0.5), cv::FILLED);
+    cv::circle(image, {50, 50}, 15, cv::Scalar(0.003, 0.003, 0.003), cv::FILLED);
+    cv::circle(image, {80, 50}, 2, cv::Scalar(0.003, 0.003, 0.003), cv::FILLED);
+    const cv::Mat1b mask = automatic_mask({image}, {});
+    EXPECT_EQ(mask(50, 50), 0);
+    EXPECT_EQ(mask(50, 80), 255);
+    EXPECT_EQ(mask(50, 22), 255);
+    EXPECT_EQ(mask(5, 5), 0);
+}
+
 TEST(AutomaticMask, NothingLitIsAnError) {
     const std::vector<cv::Mat3f> black(3, cv::Mat3f(20, 20, cv::Vec3f(0, 0, 0)));
     EXPECT_THAT(test::input_error_of([&] { automatic_mask(black, {}); }), testing::HasSubstr("no object"));
