@@ -23,12 +23,12 @@ constexpr const char* damaged_hint = "the session is damaged or was not written 
 
 /// What to do about a session that was never sealed.
 std::string resume_hint(const fs::path& folder) {
+    const std::string resume = fmt::format("go on where it stopped: darkbox capture --resume {}", folder.string());
     try {
-        if (Journal::read_head(folder).source == "import") return "import the pictures again into a new folder";
+        return Journal::read_head(folder).source == "import" ? "import the pictures again into a new folder" : resume;
     } catch (const Error&) {
-        // Resuming tells what is wrong with the journal.
+        return resume;  // that tells what is wrong with the journal
     }
-    return fmt::format("go on where it stopped: darkbox capture --resume {}", folder.string());
 }
 
 void require_sealed(const fs::path& folder) {
