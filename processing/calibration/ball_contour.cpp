@@ -53,7 +53,8 @@ std::optional<Reading> steepest(const cv::Mat1f& image, const Circle& circle, do
     const double before = slope[i - 1], at = slope[i], after = slope[i + 1];
     if (!(at > before && at >= after)) return std::nullopt;  // steepest at the end of the reach: not this edge
     const double shift = 0.5 * (before - after) / (before - 2 * at + after);
-    const double offset = (static_cast<double>(i) + shift - static_cast<double>(p.size() / 2)) * step_px;
+    const std::size_t middle = p.size() / 2;
+    const double offset = (static_cast<double>(i) + shift - static_cast<double>(middle)) * step_px;
     const double radius = circle.radius + offset;
     return Reading{{circle.x + radius * out.x, circle.y + radius * out.y}, at / (std::max(p[i], 0.0) + floor_radiance)};
 }
