@@ -78,6 +78,8 @@ void SimCamera::start() {
     stream_start_ = clock_.now();
     first_sequence_ = next_sequence_;
     queue_.clear();
+    // Now, while nobody waits with a lamp lit: in real time the rendering takes longer than a lamp may be on.
+    if (!scene_.lamps.empty()) picture_of(LampId{0});
 }
 
 void SimCamera::stop() {

@@ -12,7 +12,7 @@ std::string hint_for(int error_number) {
     switch (error_number) {
         case ENOSPC:
         case EDQUOT:
-            return "free space on that disk, then run the same command again: nothing already captured is lost";
+            return "free space on that disk; nothing already captured is lost";
         case EACCES:
         case EPERM:
             return "check the permissions of that path and the groups of this user";

@@ -185,8 +185,14 @@ private:
         }
     }
 
-    /// A picture contradicted its timestamps: from here on the run waits longer after every switch.
-    void distrust_timestamps() { margin_ = 2 * margin_ + frame_time(); }
+    /// A picture contradicted its timestamps: from here on the run waits longer after every switch, but never longer
+    /// than the camera can hold pictures back.
+    void distrust_timestamps() {
+        constexpr int spare_frames = 4;
+        const auto held_back =
+            frame_time() * (source_.info().queue_depth + source_.info().latency_frames + spare_frames);
+        margin_ = std::min<Nanoseconds>(2 * margin_ + frame_time(), held_back);
+    }
 
     std::string take_once(const Shot& shot) {
         source_.recover();
@@ -201,8 +207,8 @@ private:
     template <typename Kind>
     void reject(const Shot& shot, int number, const Kind& error) {
         ++summary_.repeated;
-        writer_.note_event(fmt::format("{}: try {} of {}: {}", shot.name, number, rig_.capture.tries, error.what()));
         lamps_.dark();
+        writer_.note_event(fmt::format("{}: try {} of {}: {}", shot.name, number, rig_.capture.tries, error.what()));
         if (number < rig_.capture.tries) return;
         const std::string who = shot.lamp ? fmt::format("lamp '{}', frame {}", lamp(shot).name, shot.name)
                                           : fmt::format("all lamps dark, frame {}", shot.name);

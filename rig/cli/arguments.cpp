@@ -72,6 +72,15 @@ Light parse_light(const std::string& text) {
     return light;
 }
 
+void require_outside_payload(const std::filesystem::path& out) {
+    namespace fs = std::filesystem;
+    for (fs::path part = fs::weakly_canonical(fs::absolute(out)); part.has_relative_path(); part = part.parent_path())
+        if (part.filename() == "data" &&
+            (fs::exists(part.parent_path() / "bagit.txt") || fs::exists(part.parent_path() / "journal.jsonl")))
+            throw InputError(fmt::format("'{}' lies inside the session {}", out.string(), part.parent_path().string()),
+                             "write elsewhere: a session's data is never edited");
+}
+
 void write_relit(const std::filesystem::path& path, const cv::Mat3f& linear, double gain) {
     const std::string extension = path.extension().string();
     if (extension == ".exr") {

@@ -64,6 +64,14 @@ CaptureRequest request_for(const Arguments& a) {
     return request;
 }
 
+/// The remedy, and the command that goes on, where there is an interrupted session to go on with.
+std::string way_on(const fs::path& session, const std::string& remedy) {
+    std::error_code ignored;
+    if (!fs::exists(session / "journal.jsonl", ignored)) return remedy;
+    return fmt::format("{}go on with: darkbox capture --standalone --resume {}",
+                       remedy.empty() ? "" : remedy + "; then ", session.string());
+}
+
 CommandResult capture_here(const Arguments& a, const WorkContext& work) {
     const CaptureRequest request = request_for(a);
     const RigDescription description = rig_for(a, request);
@@ -72,8 +80,12 @@ CommandResult capture_here(const Arguments& a, const WorkContext& work) {
         const CaptureOutcome o = rig->capture(request, work);
         return captured(o.session.string(), o.frames, o.repeated, o.resumed, o.duration.count());
     } catch (const Cancelled& cancelled) {
-        throw Cancelled(std::string(cancelled.what()) + "; the lamps are dark",
-                        fmt::format("go on with: darkbox capture --standalone --resume {}", request.folder.string()));
+        rig->dark();  // said below only because this did not throw
+        throw Cancelled(std::string(cancelled.what()) + "; the lamps are dark", way_on(request.folder, ""));
+    } catch (const DeviceError& error) {
+        throw DeviceError(error.what(), way_on(request.folder, error.hint()));
+    } catch (const InputError& error) {
+        throw InputError(error.what(), way_on(request.folder, error.hint()));
     }
 }
 
@@ -83,18 +95,25 @@ CommandResult capture_here(const Arguments& a, const WorkContext& work) {
 class FollowedCapture {
 public:
     FollowedCapture(const DaemonClient& client, const EventJson& job, const WorkContext& work)
-        : client_(client), id_(job.at("id")), first_event_(job.at("event")), work_(work) {}
+        : client_(client), id_(job.at("id")), session_(job.at("session")), first_event_(job.at("event")), work_(work) {}
 
     EventJson end() {
-        client_.follow_events(first_event_, {.event = [this](const EventJson& event) { return hear(event); },
-                                             .idle = [this] { cancel_if_asked(); }});
-        if (end_.is_null())
-            throw DeviceError("darkboxd stopped before the capture was done",
-                              "start it again, then darkbox sessions, and darkbox capture --resume SESSION");
+        try {
+            client_.follow_events(first_event_, {.event = [this](const EventJson& event) { return hear(event); },
+                                                 .idle = [this] { cancel_if_asked(); }});
+        } catch (const DeviceError& error) {
+            stopped_early(fmt::format(": {}", error.what()));
+        }
+        if (end_.is_null()) stopped_early("");
         return std::move(end_);
     }
 
 private:
+    [[noreturn]] void stopped_early(const std::string& why) const {
+        throw DeviceError("darkboxd stopped before the capture was done" + why,
+                          fmt::format("start it again, then: darkbox capture --resume {}", session_));
+    }
+
     DaemonClient::Follow hear(const EventJson& event) {
         cancel_if_asked();
         if (event.value("capture", std::uint64_t{0}) != id_) return DaemonClient::Follow::go_on;
@@ -114,6 +133,7 @@ private:
 
     const DaemonClient& client_;
     const std::uint64_t id_;
+    const std::string session_;
     const std::uint64_t first_event_;
     const WorkContext& work_;
     bool asked_ = false;
@@ -159,7 +179,8 @@ std::vector<std::string> lamps_of_plan(const std::string& plan) {
     std::vector<std::string> lamps;
     if (plan == "all") return lamps;
     std::istringstream names(plan);
-    for (std::string name; std::getline(names, name, ',');) {
+    for (std::string name; std::getline(names >> std::ws, name, ',');) {
+        while (name.ends_with(' ')) name.pop_back();
         if (name.empty())
             throw InputError(fmt::format("--plan \"{}\" holds an empty name", plan), "write lamp-01,lamp-02 or all");
         lamps.push_back(name);

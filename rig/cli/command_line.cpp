@@ -13,17 +13,22 @@
 namespace darkbox {
 namespace {
 
+/// Unlike fmt::print, which throws when stderr is closed: there would be nobody left to tell.
+void put(const std::string& text) { std::fputs(text.c_str(), stderr); }
+
 void print_error(const std::string& what, const std::string& hint) {
     const bool colour = ::isatty(STDERR_FILENO) != 0;
     const auto style = colour ? fmt::fg(fmt::terminal_color::red) | fmt::emphasis::bold : fmt::text_style();
-    fmt::print(stderr, "{} {}\n", fmt::format(style, "error:"), what);
-    if (!hint.empty()) fmt::print(stderr, "  {}\n", hint);
+    put(fmt::format("{} {}\n", fmt::format(style, "error:"), what));
+    if (!hint.empty()) put(fmt::format("  {}\n", hint));
 }
+
+std::string printed(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace); }
 
 void print_warning(const std::string& warning) {
     const bool colour = ::isatty(STDERR_FILENO) != 0;
     const auto style = colour ? fmt::text_style(fmt::fg(fmt::terminal_color::yellow)) : fmt::text_style();
-    fmt::print(stderr, "{} {}\n", fmt::format(style, "warning:"), warning);
+    put(fmt::format("{} {}\n", fmt::format(style, "warning:"), warning));
 }
 
 }  // namespace
@@ -57,12 +62,17 @@ int CommandLine::run(int argc, char** argv) {
     try {
         return parse_and_run(argc, argv);
     } catch (const Error& error) {
-        print_error(error.what(), error.hint());
+        return fail(error.what(), error.hint());
     } catch (const std::bad_alloc&) {
-        print_error("out of memory", "close other programs, or work on smaller pictures");
+        return fail("out of memory", "close other programs, or work on smaller pictures");
     } catch (const std::exception& error) {
-        print_error(fmt::format("unexpected: {}", error.what()), "this is a defect of darkbox; please report it");
+        return fail(fmt::format("unexpected: {}", error.what()), "this is a defect of darkbox; please report it");
     }
+}
+
+int CommandLine::fail(const std::string& what, const std::string& hint) const {
+    print_error(what, hint);
+    if (json_) std::fputs((printed({{"error", what}, {"hint", hint}}) + "\n").c_str(), stdout);
     return exit_failed;
 }
 
@@ -85,7 +95,7 @@ int CommandLine::parse_and_run(int argc, char** argv) {
     if (json_) {
         Json json = result.json;
         if (!json.contains("warnings")) json["warnings"] = result.warnings;
-        fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
+        fmt::print("{}\n", printed(json));
     } else if (!result.text.empty()) {
         fmt::print("{}\n", result.text);
     }

@@ -42,6 +42,7 @@ public:
 
 private:
     int parse_and_run(int argc, char** argv);
+    int fail(const std::string& what, const std::string& hint) const;
 
     CLI::App app_;
     std::optional<Body> chosen_;

@@ -6,8 +6,9 @@
 
 namespace darkbox {
 
-/// Turns the first SIGINT or SIGTERM into a stop request, so that the command can leave the lamps dark and its session
-/// resumable; a second one ends the process at once. Constructed before any other thread starts.
+/// Turns SIGINT, SIGTERM, SIGHUP (a closed terminal) and SIGQUIT into a stop request, so that the command can leave the
+/// lamps dark and its session resumable; only the third ends the process at once. A broken pipe is an error of that
+/// write, not a signal. Constructed before any other thread starts.
 class Interrupt {
 public:
     Interrupt();

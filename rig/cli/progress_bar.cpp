@@ -58,7 +58,7 @@ void ProgressBar::show(const ProgressUpdate& update) {
     drawn_at_ = now;
     visible_ = true;
     const double seconds = std::chrono::duration<double>(now - stage_start_).count();
-    fmt::print(stderr, "{}{}", erase_line, progress_line(update, seconds, terminal_columns()));
+    std::fputs((erase_line + progress_line(update, seconds, terminal_columns())).c_str(), stderr);
     std::fflush(stderr);
 }
 
@@ -66,7 +66,7 @@ void ProgressBar::finish() {
     const std::scoped_lock lock(mutex_);
     if (!visible_) return;
     visible_ = false;
-    fmt::print(stderr, "{}", erase_line);
+    std::fputs(erase_line, stderr);
     std::fflush(stderr);
 }
 

@@ -4,6 +4,7 @@
 
 #include "processing/pipeline/evaluate.h"
 #include "processing/pipeline/export.h"
+#include "rig/cli/arguments.h"
 #include "rig/cli/commands.h"
 
 namespace darkbox {
@@ -54,6 +55,7 @@ CommandResult evaluate(const fs::path& folder, const std::optional<fs::path>& li
 
 CommandResult export_to(const fs::path& folder, const std::string& format, const fs::path& out,
                         const WorkContext& work) {
+    require_outside_payload(out);
     export_session(Session::open(folder), export_format(format), out, work);
     CommandResult result;
     result.json = {{"format", format}, {"out", out.string()}};

@@ -124,7 +124,9 @@ CLI::App& add_stage(CommandLine& line, const std::string& name, const std::strin
                     const std::shared_ptr<Arguments>& a, Stage stage) {
     CLI::App& command =
         line.add(name, description, fmt::format("darkbox {} s", name), [a, stage](const WorkContext& work) {
-            return result_of(stage(Session::open(a->session), options_of(*a), work));
+            const Session session = Session::open(a->session);
+            session.verify();
+            return result_of(stage(session, options_of(*a), work));
         });
     command.add_option("session", a->session, "The session's folder")->required();
     return command;

@@ -79,7 +79,13 @@ std::vector<fs::path> write_relit_pictures(const Arguments& a, const RelightScen
 
 CommandResult run(const Arguments& a, const WorkContext& work) {
     const bool relit_wanted = !a.relight.lights.empty() || !a.relight.environments.empty();
-    for (const std::string& light : a.relight.lights) parse_light(light);  // refuse a typing error before the long work
+    require_outside_payload(a.out);
+    if (!a.source.empty() && !a.source_mask.empty())
+        throw InputError("--source-mask goes with plain maps, a session has its own", "leave it out");
+    // What will be needed after the long work is refused before it.
+    relight_options(a.relight);
+    for (const std::string& light : a.relight.lights) parse_light(light);
+    for (const std::string& file : a.relight.environments) read_environment(file);
     const Source source = load_source(a);
     if (relit_wanted && !source.shading)
         throw InputError("plain maps cannot be relit: they have no shading maps",

@@ -4,6 +4,7 @@
 
 #include <chrono>
 
+#include "acquisition/device/device_error.h"
 #include "acquisition/frame/error.h"
 #include "sim/sim_rig.h"
 
@@ -18,8 +19,9 @@ public:
 
     CaptureOutcome capture(const CaptureRequest& request, const WorkContext& work) override {
         const auto start = Stopwatch::now();
+        sim_ = sim::SimRig::make(rig_);  // its truth is of this capture alone
         const auto [session, summary] = capture_session(request, rig_, sim_.lamps(), sim_.camera(), sim_.clock(), work);
-        sim_.write_truth(session.folder() / "truth");
+        write_truth(session.folder());
         return {.session = session.folder(),
                 .frames = session.frames().size(),
                 .resumed = summary.resumed,
@@ -30,6 +32,23 @@ public:
     void dark() override { sim_.lamps().dark(); }
 
 private:
+    /// All of it or nothing: the session is sealed by now and complete without it.
+    void write_truth(const std::filesystem::path& session) const {
+        const auto partial = session / "truth.partial";
+        try {
+            sim_.write_truth(partial);
+            std::filesystem::remove_all(session / "truth");
+            std::filesystem::rename(partial, session / "truth");
+        } catch (const std::exception& error) {
+            std::error_code ignored;
+            std::filesystem::remove_all(partial, ignored);
+            throw DeviceError(fmt::format("the session {} is sealed and complete, but the simulator's truth beside it "
+                                          "could not be written: {}",
+                                          session.string(), error.what()),
+                              "free space on that disk and capture again if you need the truth");
+        }
+    }
+
     RigDescription rig_;
     sim::SimRig sim_;
 };

@@ -40,12 +40,15 @@ fs::path first_given(const fs::path& option, const fs::path& configured, fs::pat
     return configured.empty() ? otherwise() : configured;
 }
 
+/// Never throws, unlike fmt::print: stderr may be closed.
+void put(const std::string& text) { std::fputs(text.c_str(), stderr); }
+
 /// Everything the daemon is, wired together.
 class Daemon {
 public:
     Daemon(RigDescription rig, const fs::path& socket, const fs::path& sessions)
         : rig_(std::move(rig)),
-          signals_(io_, SIGINT, SIGTERM),
+          signals_(io_, SIGINT, SIGTERM, SIGHUP),
           watchdog_(io_),
           leave_(io_),
           server_(
@@ -61,6 +64,8 @@ public:
         notify_ready();
         io_.run();
     }
+
+    std::optional<std::string> stop() { return service_->stop(); }
 
 private:
     static HttpServerOptions server_options(const fs::path& socket) {
@@ -79,7 +84,9 @@ private:
             server_.stop();
             watchdog_.cancel();
             stopping_ = true;
-            signals_.async_wait([this](const boost::system::error_code&, int) { io_.stop(); });
+            signals_.async_wait([this](const boost::system::error_code& cancelled, int) {
+                if (!cancelled) io_.stop();
+            });
             leave_once_closed();
         });
     }
@@ -119,11 +126,18 @@ int run(const DaemonOptions& options) {
     RigDescription rig = load(options);
     const fs::path socket = first_given(options.socket, rig.socket, default_socket);
     const fs::path sessions = first_given(options.sessions, rig.sessions_folder, default_sessions_folder);
-    fmt::print(stderr, "darkboxd: rig {}, {} lamps, socket {}, sessions {}\n", rig.name, rig.lamps.size(),
-               socket.string(), sessions.string());
-    Daemon daemon(std::move(rig), socket, sessions);
-    daemon.run();
-    fmt::print(stderr, "darkboxd: stopped, lamps dark\n");
+    put(fmt::format("darkboxd: rig {}, {} lamps, socket {}, sessions {}\n", rig.name, rig.lamps.size(), socket.string(),
+                    sessions.string()));
+    const auto not_dark = [&] {
+        Daemon daemon(std::move(rig), socket, sessions);
+        daemon.run();
+        return daemon.stop();
+    }();
+    if (not_dark) {
+        put(fmt::format("darkboxd: error: stopped, but the lamps could not be proven dark: {}\n", *not_dark));
+        return 1;
+    }
+    put("darkboxd: stopped, lamps dark\n");
     return 0;
 }
 
@@ -155,9 +169,9 @@ int main(int argc, char** argv) {
     try {
         return darkbox::parse_and_run(argc, argv);
     } catch (const darkbox::Error& error) {
-        fmt::print(stderr, "darkboxd: error: {}\n  {}\n", error.what(), error.hint());
+        darkbox::put(fmt::format("darkboxd: error: {}\n  {}\n", error.what(), error.hint()));
     } catch (const std::exception& error) {
-        fmt::print(stderr, "darkboxd: error: {}\n", error.what());
+        darkbox::put(fmt::format("darkboxd: error: {}\n", error.what()));
     }
     return 1;
 }

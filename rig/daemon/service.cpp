@@ -12,6 +12,18 @@ namespace {
 
 constexpr const char* resume_hint = "what was captured is kept: resume it with darkbox capture --resume {}";
 
+bool has_journal(const std::filesystem::path& session) {
+    std::error_code ignored;
+    return std::filesystem::exists(session / "journal.jsonl", ignored);
+}
+
+/// The remedy, and how to go on with what was captured.
+std::string hint_for(const Failure& failure, const std::filesystem::path& session) {
+    const std::string resume = fmt::format(fmt::runtime(resume_hint), session.filename().string());
+    if (failure.cancelled || failure.hint.empty()) return resume;
+    return has_journal(session) ? failure.hint + "; " + resume : failure.hint;
+}
+
 /// The single place of the daemon's work that catches: whatever goes wrong comes back as words.
 std::optional<Failure> attempt(const std::function<void()>& work) noexcept {
     try {
@@ -75,6 +87,12 @@ Service::Service(OpenRig open, ServiceOptions options, EventLog& log)
 
 Service::~Service() { request_stop(); }
 
+std::optional<std::string> Service::stop() {
+    request_stop();
+    if (thread_.joinable()) thread_.join();
+    return not_dark_ ? std::optional(not_dark_->what) : std::nullopt;
+}
+
 ServiceStatus Service::status() const {
     const std::scoped_lock lock(mutex_);
     ServiceStatus status{.state = state_, .problem = problem_, .last_event = log_.last()};
@@ -135,12 +153,9 @@ std::uint64_t Service::darken() {
     const std::scoped_lock lock(mutex_);
     if (state_ == ServiceState::offline) refuse(state_, problem_);
     const std::uint64_t event = log_.last();
-    if (state_ == ServiceState::busy) {
-        job_stop_.request_stop();
-    } else {
-        tasks_.emplace_back(Darken{});
-        wake_.notify_all();
-    }
+    if (state_ == ServiceState::busy) job_stop_.request_stop();
+    tasks_.emplace_back(Darken{});  // also after a capture: its own darkening may have been told before `event`
+    wake_.notify_all();
     return event;
 }
 
@@ -167,7 +182,7 @@ void Service::forget_old_jobs() {
 void Service::run(const std::stop_token& stop) {
     if (open_rig(stop)) {
         while (const auto task = next_task(stop)) std::visit([this](const auto& t) { perform(t); }, *task);
-        darken_lamps();
+        not_dark_ = darken_lamps();
         rig_.reset();
     }
     log_.close();
@@ -209,8 +224,7 @@ void Service::perform(const Capture& capture) {
     const auto not_dark = darken_lamps();
     ended.state = !failure ? JobState::done : failure->cancelled ? JobState::cancelled : JobState::failed;
     if (failure) ended.failure = *failure;
-    if (failure && (failure->cancelled || failure->hint.empty()))
-        ended.failure.hint = fmt::format(fmt::runtime(resume_hint), ended.session);
+    if (failure) ended.failure.hint = hint_for(*failure, capture.request.folder);
     finish(std::move(ended), not_dark);
 }
 

@@ -87,6 +87,8 @@ public:
 
     /// Cancels what runs and lets the thread end; the event log is closed when it did.
     void request_stop() noexcept;
+    /// Stops and waits for the end; says why the lamps could not be proven dark, where they could not.
+    std::optional<std::string> stop();
 
 private:
     struct Capture {
@@ -127,6 +129,7 @@ private:
     bool stopping_ = false;                       // guarded by mutex_
 
     std::unique_ptr<CaptureRig> rig_;  // the thread's own
+    std::optional<Failure> not_dark_;  // the thread's own until it was joined
     std::jthread thread_;              // last: ends before what it uses
 };
 
