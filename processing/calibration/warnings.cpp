@@ -18,6 +18,13 @@ void warn_of_geometry(const Calibration& calibration, std::vector<std::string>& 
             calibration.condition_number));
 }
 
+void warn_of_lights_behind(const Lights& lights, std::vector<std::string>& warnings) {
+    for (const Light& light : lights)
+        if (light.used && light.direction.z() <= 0)
+            warnings.push_back(
+                fmt::format("the light of {} lies behind the object: z must point to the viewer", light.file));
+}
+
 void warn_of_duplicates(const Lights& lights, std::vector<std::string>& warnings) {
     for (std::size_t i = 0; i < lights.size(); ++i)
         for (std::size_t j = i + 1; j < lights.size(); ++j) {
@@ -50,6 +57,7 @@ void warn_of_outline(const Calibration& calibration, std::vector<std::string>& w
 std::vector<std::string> warnings_about(const Calibration& calibration) {
     std::vector<std::string> warnings;
     warn_of_geometry(calibration, warnings);
+    warn_of_lights_behind(calibration.lights, warnings);
     warn_of_duplicates(calibration.lights, warnings);
     warn_of_outline(calibration, warnings);
     return warnings;

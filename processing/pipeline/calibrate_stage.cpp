@@ -93,9 +93,12 @@ void require_highlights(const Calibration& calibration, const std::vector<std::s
             unread.push_back(file);
     }
     if (unread.empty()) return;
+    const Ball ball = calibration.balls.empty() ? Ball{} : calibration.balls.front();
     throw InputError(
-        fmt::format("the ball shows no usable highlight of the lamp in {}", fmt::join(unread, ", ")),
-        fmt::format("leave such a frame out with --drop {}, or read its highlight by hand with --highlight {}=X,Y",
+        fmt::format("the ball at ({:.1f}, {:.1f}) of radius {:.1f} shows no usable highlight of the lamp in {}", ball.x,
+                    ball.y, ball.radius, fmt::join(unread, ", ")),
+        fmt::format("if that is not the ball, give --ball X,Y,R; else leave a frame out with --drop {}, or read its "
+                    "highlight by hand with --highlight {}=X,Y",
                     unread[0], unread[0]));
 }
 
@@ -137,6 +140,7 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
     }
     if (options.from || given) append(summary.calibration.warnings, warnings_about(summary.calibration));
     warn_of_few_lights(summary.calibration);
+    remove_derived(session, {"results", "texels", "shading"});
     write_calibration(files.calibration, summary.calibration, lamps_of(lit));
     write_lp(files.lights_lp, summary.calibration.lights);
     summary.seconds.write = watch.lap();

@@ -41,9 +41,9 @@ struct ImportOptions {
 
 /// Photographs from any camera become a sealed session: their bytes, masks, given lights and truth are copied; the
 /// choice of transfer curve is recorded per frame and in the notes, with warnings in words (SessionInfo::notes that
-/// begin with "warning: "). Names are ordered naturally; a picture whose name holds "mask" is a mask, of the
-/// object or, beside the ball's photographs, of the ball. Throws
-/// InputError: a file that cannot be read, two sizes (both files are named), a ball capture or lights of another count.
+/// begin with "warning: "). Names are ordered naturally; a picture whose name begins or ends with the word "mask" is a
+/// mask, of the object or, beside the ball's photographs, of the ball. Throws InputError: a file that cannot be read,
+/// two sizes (both files are named), a ball capture or lights of another count.
 Session import_photographs(const ImportOptions& options, const WorkContext& work = {});
 
 }  // namespace darkbox

@@ -78,7 +78,7 @@ NormalsSummary run_normals(const Session& session, const PhotometricStereoOption
     watch.lap();
     summary.seconds.solve = solved.seconds;
     summary.solver = "lsq";
-    summary.images = stack.images.size();
+    summary.images = static_cast<std::size_t>(direction_matrix(lights).rows());
     summary.pixels = solved.pixels;
     summary.residual_rms = solved.residual_rms;
     summary.mean_angular_error_deg = error_against_truth(session, solved.normals);
@@ -89,6 +89,7 @@ NormalsSummary run_normals(const Session& session, const PhotometricStereoOption
         if (const auto warning = transfer_warning(stack, lights, *curve, solved.residual_rms, work))
             summary.warnings.push_back(*warning);
     watch.lap();
+    remove_derived(session, {"texels", "shading"});
     write_maps(files, solved, work);
     summary.seconds.write = watch.lap();
     write_json(files.results_summary, to_json(summary));

@@ -37,6 +37,12 @@ void require_made(const fs::path& file, const Session& session, const char* comm
                          fmt::format("run 'darkbox {} {}' first", command, session.folder().string()));
 }
 
+void remove_derived(const Session& session, const std::vector<std::string>& folders) {
+    std::error_code ignored;  // what cannot be removed cannot be written over either, and that is reported
+    for (const std::string& folder : folders) std::filesystem::remove_all(session.folder() / folder, ignored);
+    std::filesystem::remove(session.folder() / "report.html", ignored);
+}
+
 std::vector<FrameRecord> frames_of_kind(const Session& session, FrameKind kind) {
     std::vector<FrameRecord> frames;
     std::copy_if(session.frames().begin(), session.frames().end(), std::back_inserter(frames),

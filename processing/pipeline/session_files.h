@@ -32,6 +32,9 @@ struct ResultFiles {
 /// Throws InputError whose hint is the command to run first.
 void require_made(const std::filesystem::path& file, const Session& session, const char* command);
 
+/// Removes these folders of derived files: they were made from what is about to change. The report goes with them.
+void remove_derived(const Session& session, const std::vector<std::string>& folders);
+
 std::vector<FrameRecord> frames_of_kind(const Session& session, FrameKind kind);
 std::string basename_of(const FrameRecord& frame);
 /// The path of a mask or given file where the session has it.

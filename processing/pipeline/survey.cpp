@@ -91,7 +91,13 @@ Survey survey_rti(const fs::path& folder, const fs::path& lp, const std::vector<
     Survey survey;
     survey.layout = "RTI folder with " + lp.filename().string();
     survey.lights = lp;
-    for (const Light& light : read_lights(lp).lights) survey.frames.push_back(require_listed(folder, light.file, lp));
+    for (const Light& light : read_lights(lp).lights) {
+        const fs::path frame = require_listed(folder, light.file, lp);
+        if (std::find(survey.frames.begin(), survey.frames.end(), frame) != survey.frames.end())
+            throw InputError(fmt::format("{} names {} twice", lp.string(), light.file),
+                             "give each photograph one line");
+        survey.frames.push_back(frame);
+    }
     std::copy_if(files.begin(), files.end(), std::back_inserter(survey.masks),
                  [](const fs::path& file) { return picture_format_of(file) && is_mask_name(file); });
     return survey;
@@ -119,14 +125,23 @@ Survey survey_one(const fs::path& folder, ImportLayout layout) {
 
 }  // namespace
 
-bool is_mask_name(const fs::path& path) { return lower(path.stem().string()).find("mask") != std::string::npos; }
+bool is_mask_name(const fs::path& path) {
+    const std::string stem = lower(path.stem().string());
+    constexpr std::string_view separators = "._- ";
+    const std::string first = stem.substr(0, stem.find_first_of(separators));
+    const auto last = stem.find_last_of(separators);
+    return first == "mask" || (last != std::string::npos && stem.substr(last + 1) == "mask");
+}
 
 Survey survey_folders(const std::vector<fs::path>& folders, ImportLayout layout) {
     if (folders.size() == 1) return survey_one(folders.front(), layout);
     Survey all;
     all.layout = fmt::format("{} folders", folders.size());
     for (const fs::path& folder : folders) {
-        const Survey one = survey_one(folder, ImportLayout::plain);
+        const Survey one = survey_one(folder, layout);
+        if (one.lights || layout == ImportLayout::diligent || is_diligent(folder))
+            throw InputError(fmt::format("{} comes with its own lights ({})", folder.string(), one.layout),
+                             "import such a folder by itself");
         all.frames.insert(all.frames.end(), one.frames.begin(), one.frames.end());
         all.masks.insert(all.masks.end(), one.masks.begin(), one.masks.end());
     }

@@ -12,7 +12,7 @@ namespace darkbox {
 /// What lies in the folders of one object, before anything is read.
 struct Survey {
     std::vector<std::filesystem::path> frames;  ///< in the session's order
-    std::vector<std::filesystem::path> masks;   ///< pictures whose name holds "mask"
+    std::vector<std::filesystem::path> masks;   ///< pictures whose name begins or ends with the word "mask"
     std::optional<std::filesystem::path> lights;
     std::optional<std::filesystem::path> intensities;
     std::optional<std::filesystem::path> truth;

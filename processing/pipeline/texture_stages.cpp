@@ -47,6 +47,7 @@ TexelsSummary run_texels(const Session& session, const TexelOptions& options, co
     summary.texels = clustered.index.texels;
     summary.within_cluster_variance = clustered.within_cluster_variance;
     summary.variance_explained = clustered.variance_explained;
+    remove_derived(session, {"shading"});
     write_index_map(files.index, clustered.index);
     summary.seconds.write = watch.lap();
     write_json(files.texels, to_json(summary));

@@ -172,7 +172,34 @@ TEST_F(BadInput, ChecksumThatDoesNotFit) {
     file.seekp(60);
     file.put('\x7f');
     file.close();
-    expect_one_error(darkbox_program({"verify", s.string()}), frame.filename().string());
+    for (const char* command : {"verify", "process", "calibrate"})
+        expect_one_error(darkbox_program({command, s.string()}), frame.filename().string());
+}
+
+TEST_F(BadInput, UnknownKeyInTheRigDescription) {
+    std::ofstream(path("rig.toml")) << "[rig]\nname = \"r\"\n[camera]\ndriver = \"sim\"\nexposure_mss = 20\n";
+    expect_one_error(darkbox_program({"rig", "check", "--rig", path("rig.toml").string()}), "exposure_ms");
+}
+
+TEST_F(BadInput, OutputInsideASealedSession) {
+    const std::string s = session();
+    ASSERT_EQ(darkbox_program({"process", s}).status, 0);
+    const std::string frame = s + "/data/frames/p0.png";
+    expect_one_error(darkbox_program({"relight", s, "--light", "0,0,1", "--out", frame}), "inside the session");
+    EXPECT_EQ(darkbox_program({"verify", s}).status, 0);
+}
+
+TEST_F(BadInput, OldTexelsDoNotOutliveTheirNormals) {
+    const std::string s = session();
+    ASSERT_EQ(darkbox_program({"process", s}).status, 0);
+    ASSERT_EQ(darkbox_program({"normals", s}).status, 0);
+    expect_one_error(darkbox_program({"relight", s, "--light", "0,0,1", "--out", path("x.png").string()}), "texels");
+}
+
+TEST_F(BadInput, JsonTellsOfAnErrorToo) {
+    const auto r = darkbox_program({"verify", path("nothing").string(), "--json"});
+    EXPECT_EQ(r.status, 1);
+    EXPECT_THAT(nlohmann::json::parse(r.out).at("error").get<std::string>(), HasSubstr("nothing"));
 }
 
 TEST_F(BadInput, NotASession) { expect_one_error(darkbox_program({"process", path("nothing").string()}), "nothing"); }
