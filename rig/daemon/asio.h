@@ -2,7 +2,14 @@
 
 // Boost's networking, included in one place: Boost 1.74 forgets <utility> before awaitable.hpp, and every file that
 // names it costs seconds of compiling. Only the HTTP server and the client do.
+#include <coroutine>
 #include <utility>
+
+// Boost 1.74 knows Clang's coroutines only by their old, experimental name; analysis by Clang needs the standard one.
+#if defined(__clang__) && !defined(BOOST_ASIO_HAS_CO_AWAIT)
+#define BOOST_ASIO_HAS_CO_AWAIT 1
+#define BOOST_ASIO_HAS_STD_COROUTINE 1
+#endif
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
