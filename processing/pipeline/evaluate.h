@@ -24,8 +24,8 @@ struct Evaluation {
 };
 
 /// Compares a processed session with the truth that is known of it: data/given/ for imports (Normal_gt.mat), truth/
-/// beside the payload for simulated captures (normals.exr, lights.lp). The only reader of that truth; no stage sees it.
-/// Throws InputError when nothing was computed yet or no truth is known.
+/// beside the payload for simulated captures (normals.exr, lights.lp). No stage computes with it; run_normals only
+/// reports its error against an import's. Throws InputError when nothing was computed yet or no truth is known.
 /// `reference_lights`, where given, is the truth for the lights instead, in the frames' order.
 Evaluation evaluate_session(const Session& session, const std::optional<std::filesystem::path>& reference_lights = {},
                             const WorkContext& work = {});
