@@ -181,7 +181,7 @@ void refine_directions(const LocatedBall& located, Calibration& calibration) {
     for (std::size_t i = 0; i < calibration.lights.size(); ++i) {
         if (!refined.lights[i]) continue;
         calibration.lights[i].direction = refined.lights[i]->direction;
-        calibration.lights[i].sigma_deg = refined.lights[i]->sigma_deg;
+        calibration.lights[i].covariance = refined.lights[i]->covariance;
         calibration.lights[i].used = true;
     }
     calibration.balls = {as_ball(refined.circle, located.confidence)};

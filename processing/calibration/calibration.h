@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "processing/maps/lights.h"
+#include "processing/maps/view.h"
 
 namespace darkbox {
 
@@ -47,6 +48,7 @@ struct Calibration {
     Lights lights;  ///< one per frame, in the frames' order
     std::vector<Ball> balls;
     std::vector<std::optional<Highlight>> highlights;  ///< one per frame
+    std::optional<ViewGeometry> view;                  ///< where millimetres are known
     double condition_number = 0;
     double contour_rms_px = 0;
     std::string method;

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <numbers>
 
 #include "acquisition/frame/error.h"
 
@@ -76,8 +75,8 @@ ceres::Solver::Summary solve(Adjustment& adjustment) {
     return summary;
 }
 
-/// Per tangent axis, in degrees: the trace of the 3 x 3 covariance of a unit vector spreads over two axes.
-std::vector<double> direction_sigmas_deg(Adjustment& adjustment) {
+/// Of the unit vectors, in the viewer frame, rad^2: rank two each. Zero where it cannot be had.
+std::vector<Eigen::Matrix3d> direction_covariances(Adjustment& adjustment) {
     ceres::Covariance::Options options;
     options.num_threads = 1;
     options.algorithm_type = ceres::DENSE_SVD;
@@ -85,14 +84,12 @@ std::vector<double> direction_sigmas_deg(Adjustment& adjustment) {
     ceres::Covariance covariance(options);
     std::vector<std::pair<const double*, const double*>> blocks;
     for (const auto& direction : adjustment.directions) blocks.emplace_back(direction.data(), direction.data());
-    std::vector<double> sigmas(adjustment.directions.size(), 0.0);
-    if (blocks.empty() || !covariance.Compute(blocks, &adjustment.problem)) return sigmas;
-    for (std::size_t i = 0; i < sigmas.size(); ++i) {
-        std::array<double, 9> c{};
-        covariance.GetCovarianceBlock(blocks[i].first, blocks[i].second, c.data());
-        sigmas[i] = std::sqrt((c[0] + c[4] + c[8]) / 2) * 180 / std::numbers::pi;
+    std::vector<Eigen::Matrix3d> covariances(adjustment.directions.size(), Eigen::Matrix3d::Zero());
+    if (blocks.empty() || !covariance.Compute(blocks, &adjustment.problem)) return covariances;
+    for (std::size_t i = 0; i < covariances.size(); ++i) {
+        covariance.GetCovarianceBlock(blocks[i].first, blocks[i].second, covariances[i].data());  // symmetric
     }
-    return sigmas;
+    return covariances;
 }
 
 double contour_rms(const std::vector<cv::Point2d>& contour, const Circle& circle) {
@@ -107,7 +104,7 @@ double contour_rms(const std::vector<cv::Point2d>& contour, const Circle& circle
 RefineResult refine(const RefineInput& input) {
     Adjustment adjustment(input);
     const ceres::Solver::Summary summary = solve(adjustment);
-    const std::vector<double> sigmas = direction_sigmas_deg(adjustment);
+    const std::vector<Eigen::Matrix3d> covariances = direction_covariances(adjustment);
 
     RefineResult result;
     result.converged = summary.IsSolutionUsable();
@@ -118,7 +115,7 @@ RefineResult refine(const RefineInput& input) {
         result.lights.emplace_back();
         if (!highlight) continue;
         const auto& d = adjustment.directions[next];
-        result.lights.back() = RefinedLight{Eigen::Vector3d(d[0], d[1], d[2]).normalized(), sigmas[next]};
+        result.lights.back() = RefinedLight{Eigen::Vector3d(d[0], d[1], d[2]).normalized(), covariances[next]};
         ++next;
     }
     return result;

@@ -21,7 +21,7 @@ struct RefineInput {
 
 struct RefinedLight {
     Eigen::Vector3d direction{0, 0, 1};
-    double sigma_deg = 0;  ///< per tangent axis
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< rad^2, rank two
 };
 
 struct RefineResult {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -19,11 +20,35 @@ Eigen::Vector3d triple_in(const json& j) {
     return {j.at(0).get<double>(), j.at(1).get<double>(), j.at(2).get<double>()};
 }
 
+/// A symmetric matrix: xx, xy, xz, yy, yz, zz.
+ordered_json matrix_json(const Eigen::Matrix3d& m) { return {m(0, 0), m(0, 1), m(0, 2), m(1, 1), m(1, 2), m(2, 2)}; }
+Eigen::Matrix3d matrix_in(const json& j) {
+    const auto c = j.get<std::array<double, 6>>();
+    Eigen::Matrix3d m;
+    m << c[0], c[1], c[2], c[1], c[3], c[4], c[2], c[4], c[5];
+    return m;
+}
+
+/// Infinite distances, which JSON has no number for, are null.
+ordered_json view_json(const ViewGeometry& view) {
+    return {{"mm_per_pixel", view.mm_per_pixel},
+            {"principal", {view.principal.x, view.principal.y}},
+            {"distance_mm", view.perspective() ? ordered_json(view.distance_mm) : ordered_json(nullptr)}};
+}
+ViewGeometry view_in(const json& j) {
+    ViewGeometry view;
+    view.mm_per_pixel = j.at("mm_per_pixel").get<double>();
+    view.principal = {j.at("principal").at(0).get<double>(), j.at("principal").at(1).get<double>()};
+    if (!j.at("distance_mm").is_null()) view.distance_mm = j.at("distance_mm").get<double>();
+    return view;
+}
+
 ordered_json light_json(const Light& light, const std::string& lamp, const std::optional<Highlight>& highlight) {
     ordered_json j{{"file", light.file},
                    {"lamp", lamp},
                    {"direction", triple(light.direction)},
-                   {"sigma_deg", light.sigma_deg},
+                   {"sigma_deg", light.sigma_deg()},
+                   {"covariance", matrix_json(light.covariance)},
                    {"intensity", triple(light.intensity)},
                    {"used", light.used}};
     if (highlight)
@@ -31,6 +56,10 @@ ordered_json light_json(const Light& light, const std::string& lamp, const std::
                           {"v", highlight->v},
                           {"sigma_px", highlight->sigma_px},
                           {"clipped", highlight->clipped}};
+    if (light.near) {
+        j["position_mm"] = triple(light.near->position_mm);
+        j["object_mm"] = triple(light.near->object_mm);
+    }
     return j;
 }
 
@@ -38,7 +67,9 @@ Light light_in(const json& j) {
     Light light;
     light.file = j.at("file").get<std::string>();
     light.direction = triple_in(j.at("direction"));
-    light.sigma_deg = j.at("sigma_deg").get<double>();
+    if (j.contains("covariance")) light.covariance = matrix_in(j.at("covariance"));
+    if (j.contains("position_mm"))
+        light.near = LampPosition{triple_in(j.at("position_mm")), triple_in(j.at("object_mm"))};
     light.intensity = triple_in(j.at("intensity"));
     light.used = j.at("used").get<bool>();
     return light;
@@ -62,6 +93,7 @@ StoredCalibration calibration_in(const json& j) {
     for (const json& ball : j.at("balls"))
         calibration.balls.push_back({ball.at("x").get<double>(), ball.at("y").get<double>(),
                                      ball.at("radius").get<double>(), ball.at("confidence").get<double>()});
+    if (j.contains("view")) calibration.view = view_in(j.at("view"));
     const json& condition = j.at("condition_number");
     calibration.condition_number =
         condition.is_null() ? std::numeric_limits<double>::infinity() : condition.get<double>();
@@ -89,6 +121,7 @@ void write_calibration(const fs::path& path, const Calibration& calibration, con
                    {"lights", lights},
                    {"warnings", calibration.warnings},
                    {"rejected", calibration.rejected}};
+    if (calibration.view) j["view"] = view_json(*calibration.view);
     write_json(path, j);
 }
 

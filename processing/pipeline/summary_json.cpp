@@ -19,7 +19,7 @@ ordered_json to_json(const CalibrateSummary& summary) {
     for (const Light& light : calibration.lights)
         lights.push_back({{"file", light.file},
                           {"direction", triple(light.direction)},
-                          {"sigma_deg", light.sigma_deg},
+                          {"sigma_deg", light.sigma_deg()},
                           {"intensity", triple(light.intensity)},
                           {"used", light.used}});
     for (const Ball& ball : calibration.balls) balls.push_back({{"x", ball.x}, {"y", ball.y}, {"radius", ball.radius}});

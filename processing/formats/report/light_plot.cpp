@@ -40,7 +40,7 @@ std::string number_beside(const Place& p, std::size_t number) {
 
 std::string mark(const Light& light, const std::string& label, double size) {
     const Place p = place_of(light.direction);
-    const double sigma = std::max(light.sigma_deg * shown_sigmas / 90.0 * radius, 0.0);
+    const double sigma = std::max(light.sigma_deg() * shown_sigmas / 90.0 * radius, 0.0);
     const std::string uncertainty =
         sigma > 0 ? fmt::format("<circle class='sigma' cx='{:.2f}' cy='{:.2f}' r='{:.2f}'/>", p.x, p.y, sigma) : "";
     return fmt::format(

@@ -57,7 +57,7 @@ std::string plots_html(const ReportContent& content) {
 }
 
 std::string light_row(const Light& light, std::size_t number) {
-    const std::string sigma = light.sigma_deg > 0 ? fmt::format("{:.3f}", light.sigma_deg) : std::string("–");
+    const std::string sigma = light.sigma_deg() > 0 ? fmt::format("{:.3f}", light.sigma_deg()) : std::string("–");
     return fmt::format(
         "<tr{}><td>{}</td><td class='text'>{}</td><td>{:.4f}</td><td>{:.4f}</td><td>{:.4f}</td><td>{}</td>"
         "<td>{:.3g}</td><td>{:.3g}</td><td>{:.3g}</td></tr>",

@@ -90,7 +90,8 @@ TEST(Refine, SigmaIsHonest) {
     for (std::uint64_t seed = 1; seed <= 40; ++seed) {
         const RefineResult result = refine(measured(lights, 0.2, 0.1, 1000 * seed));
         for (std::size_t i = 0; i < lights.size(); ++i) {
-            const double error = angle_deg(result.lights[i]->direction, lights[i]) / result.lights[i]->sigma_deg;
+            const Light light{"", result.lights[i]->direction, {1, 1, 1}, true, result.lights[i]->covariance};
+            const double error = angle_deg(light.direction, lights[i]) / light.sigma_deg();
             inside_half += error * error < 1.386;  // chi-squared with two degrees of freedom: 50 %
             inside_95 += error * error < 5.991;    // 95 %
             ++total;

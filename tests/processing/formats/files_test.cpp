@@ -45,8 +45,11 @@ TEST_F(Files, AFailedWriteNamesThePathAndKeepsTheOldFile) {
 TEST_F(Files, CalibrationComesBack) {
     Calibration calibration;
     calibration.lights.resize(2);
-    calibration.lights[0] = {"a.png", Eigen::Vector3d(0.1, 0.2, 0.97).normalized(), {1, 2, 3}, 0.12, true};
-    calibration.lights[1] = {"b.png", {0, 0, 1}, {1, 1, 1}, 0, false};
+    calibration.lights[0] = {"a.png", Eigen::Vector3d(0.1, 0.2, 0.97).normalized(), {1, 2, 3}};
+    calibration.lights[0].covariance << 4, 1, 0, 1, 3, 2, 0, 2, 5;
+    calibration.lights[0].near = LampPosition{{1, 2, 3}, {4, 5, 6}};
+    calibration.view = ViewGeometry{0.25, {160, 120}};
+    calibration.lights[1] = {"b.png", {0, 0, 1}, {1, 1, 1}, false};
     calibration.highlights = {Highlight{10.5, 20.25, 0.1, true}, std::nullopt};
     calibration.balls = {{100.5, 90.25, 40.125, 0.9}};
     calibration.condition_number = std::numeric_limits<double>::infinity();
@@ -58,6 +61,11 @@ TEST_F(Files, CalibrationComesBack) {
     ASSERT_EQ(read.lights.size(), 2u);
     EXPECT_EQ(read.lights[0].direction, calibration.lights[0].direction);
     EXPECT_EQ(read.lights[0].intensity, calibration.lights[0].intensity);
+    EXPECT_EQ(read.lights[0].covariance, calibration.lights[0].covariance);
+    EXPECT_EQ(read.lights[0].near.value().object_mm, Eigen::Vector3d(4, 5, 6));
+    EXPECT_FALSE(read.lights[1].near);
+    EXPECT_EQ(read.view.value().principal.y, 120);
+    EXPECT_FALSE(read.view->perspective());
     EXPECT_FALSE(read.lights[1].used);
     EXPECT_EQ(read.highlights[0]->v, 20.25);
     EXPECT_FALSE(read.highlights[1]);

@@ -68,7 +68,7 @@ TEST(CapturedDiligentBall, LeastSquaresReachesThePublishedError) {
     Lights lights;
     for (std::size_t i = 0; i < directions.size(); ++i) {
         add_photograph(stack, folder / fmt::format("{:03}.png", i + 1));
-        lights.push_back({stack.files.back(), directions[i], intensities[i], 0.0, true});
+        lights.push_back({stack.files.back(), directions[i], intensities[i]});
     }
     const auto result = photometric_stereo(stack, lights);
     const cv::Mat3d truth = read_true_normals(folder / "Normal_gt.mat");
