@@ -2,9 +2,9 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <cmath>
 #include <optional>
-#include <vector>
+
+#include "processing/normals/least_squares_block.h"
 
 namespace darkbox {
 namespace {
@@ -13,189 +13,160 @@ namespace {
 /// more than clipping does.
 constexpr double max_condition_growth = 4.0;
 
-/// The columns [begin, end) that hold all of a row's mask.
-struct Span {
-    int begin = 0;
-    int end = 0;
-    int size() const { return end - begin; }
+/// Where in a band a block lies.
+struct Place {
+    int row = 0;  ///< in the band
+    int column = 0;
 };
 
-Span masked_span(const cv::Mat1b& mask, int row) {
-    const uchar* m = mask[row];
-    Span span{0, mask.cols};
-    while (span.begin < span.end && m[span.begin] == 0) ++span.begin;
-    while (span.end > span.begin && m[span.end - 1] == 0) --span.end;
-    return span;
+bool on_object(const PhotoBand& band, Place place, std::size_t i) {
+    return band.mask.empty() || band.mask(place.row, place.column + static_cast<int>(i)) != 0;
 }
 
-/// One row of the solution as planes, so that the loops over columns vectorise.
-struct Planes {
-    explicit Planes(Span columns)
-        : span(columns),
-          g(static_cast<std::size_t>(3 * span.size())),
-          colour(static_cast<std::size_t>(3 * span.size())),
-          lit_weight(static_cast<std::size_t>(span.size())),
-          squared(static_cast<std::size_t>(span.size())),
-          clipped(static_cast<std::size_t>(span.size())),
-          excluded(static_cast<std::size_t>(span.size())) {}
+bool empty_of_object(const PhotoBand& band, Place place, int count) {
+    if (band.mask.empty()) return false;
+    const uchar* mask = band.mask[place.row] + place.column;
+    return std::all_of(mask, mask + count, [](uchar m) { return m == 0; });
+}
 
-    float* gx() { return g.data(); }
-    float* gy() { return g.data() + span.size(); }
-    float* gz() { return g.data() + 2 * span.size(); }
-    Eigen::Vector3f g_at(int i) { return {gx()[i], gy()[i], gz()[i]}; }
+void load(const PhotoBand& band, const LightSet& set, Place place, LeastSquaresBlock& block) {
+    block.clipped.at.fill(0.0F);
+    for (std::size_t k = 0; k < set.lights.size(); ++k) {
+        const SolverLight& light = set.lights[k];
+        load_photo(band.photos[light.image], place.row, place.column, light.gain, k, block);
+    }
+    block.samples_used.at.fill(static_cast<float>(set.lights.size()));
+}
 
-    Span span;
-    std::vector<float> g;           ///< albedo times normal: x, y, z planes
-    std::vector<float> colour;      ///< sum of I_c (g.L)+, interleaved
-    std::vector<float> lit_weight;  ///< sum of (g.L)+^2
-    std::vector<float> squared;     ///< sum of squared residuals
-    std::vector<int> clipped;       ///< clipped samples of each pixel
-    std::vector<uchar> excluded;    ///< 1: this pixel's clipped samples are left out
+/// A sample that is not finite leaves its trace in g; it is looked for before clipped samples are dropped, so that such
+/// a pixel is never half used. Returns the number of such pixels on the object.
+std::size_t find_usable(const PhotoBand& band, Place place, LeastSquaresBlock& block) {
+    std::size_t not_finite = 0;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); ++i) {
+        const float trace = block.g[0].at[i] * 0.0F + block.g[1].at[i] * 0.0F + block.g[2].at[i] * 0.0F;
+        const bool finite = trace == 0.0F, inside = on_object(band, place, i);
+        block.usable.at[i] = finite && inside ? 1.0F : 0.0F;
+        not_finite += inside && !finite ? 1 : 0;
+    }
+    return not_finite;
+}
+
+/// One pixel's samples that are not clipped.
+class UnclippedPixel {
+public:
+    UnclippedPixel(const PhotoBand& band, const LightSet& set, Place place, const LeastSquaresBlock& block,
+                   std::size_t i)
+        : set_(set), block_(block), i_(i) {
+        for (std::size_t k = 0; k < set.lights.size(); ++k)
+            if (!clipped_at(band.photos[set.lights[k].image], place.row, place.column + static_cast<int>(i)))
+                kept_.push_back(k);
+    }
+
+    std::size_t samples() const { return kept_.size(); }
+
+    /// g of these samples alone; no value where they do not determine it well.
+    std::optional<Eigen::Vector3f> solve() const {
+        Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
+        Eigen::Vector3d projected = Eigen::Vector3d::Zero();
+        for (const std::size_t k : kept_) {
+            const Eigen::Vector3d direction = set_.lights[k].direction.cast<double>();
+            moments += direction * direction.transpose();
+            projected += direction * static_cast<double>(mean(k));
+        }
+        if (kept_.size() < 3) return std::nullopt;
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+        eigen.computeDirect(moments, Eigen::EigenvaluesOnly);
+        const double limit = max_condition_growth * set_.condition_number;
+        if (!(eigen.eigenvalues()[2] <= limit * limit * eigen.eigenvalues()[0])) return std::nullopt;
+        return (moments.inverse() * projected).cast<float>();
+    }
+
+    /// Puts `g` and the sums that follow from it in place of those over all lights.
+    void put(const Eigen::Vector3f& g, LeastSquaresBlock& block) const {
+        Eigen::Array3f colour = Eigen::Array3f::Zero();
+        float lit_weight = 0, squared = 0;
+        for (const std::size_t k : kept_) {
+            const float shading = g.dot(set_.lights[k].direction), lit = std::max(shading, 0.0F);
+            const float error = mean(k) - shading;
+            colour += lit * Eigen::Array3f(block_.value(k, 0, i_), block_.value(k, 1, i_), block_.value(k, 2, i_));
+            lit_weight += lit * lit;
+            squared += error * error;
+        }
+        for (int c = 0; c < 3; ++c) {
+            block.g[static_cast<std::size_t>(c)].at[i_] = g[c];
+            block.colour[static_cast<std::size_t>(c)].at[i_] = colour[c];
+        }
+        block.lit_weight.at[i_] = lit_weight;
+        block.squared.at[i_] = squared;
+        block.samples_used.at[i_] = static_cast<float>(kept_.size());
+    }
+
+private:
+    float mean(std::size_t k) const {
+        return (block_.value(k, 0, i_) + block_.value(k, 1, i_) + block_.value(k, 2, i_)) * (1.0F / 3.0F);
+    }
+
+    const LightSet& set_;
+    const LeastSquaresBlock& block_;
+    std::size_t i_;
+    std::vector<std::size_t> kept_;
 };
 
-const float* pixels(const PhotoStack& stack, const SolverLight& light, int row, Span span) {
-    return stack.images[light.image].ptr<float>(row) + std::ptrdiff_t{3} * span.begin;
-}
-
-const uchar* clipping(const PhotoStack& stack, const SolverLight& light, int row, Span span) {
-    return stack.clipped[light.image][row] + span.begin;
-}
-
-float channel_mean(const float* rgb, const SolverLight& light) {
-    return (rgb[0] * light.gain[0] + rgb[1] * light.gain[1] + rgb[2] * light.gain[2]) / 3.0F;
-}
-
-/// g over all lights through the shared pseudo-inverse, and the count of clipped samples.
-void accumulate_all_lights(const PhotoStack& stack, const LightSet& set, int row, Planes& planes) {
-    const int n = planes.span.size();
-    float *gx = planes.gx(), *gy = planes.gy(), *gz = planes.gz();
-    for (const SolverLight& light : set.lights) {
-        const float* rgb = pixels(stack, light, row, planes.span);
-        const uchar* clipped = clipping(stack, light, row, planes.span);
-        const Eigen::Vector3f p = light.pseudo_column;
-        for (int i = 0; i < n; ++i) {
-            const float mean = channel_mean(rgb + std::ptrdiff_t{3} * i, light);
-            gx[i] += p.x() * mean;
-            gy[i] += p.y() * mean;
-            gz[i] += p.z() * mean;
-            planes.clipped[static_cast<std::size_t>(i)] += clipped[i] != 0;
-        }
+void leave_out_clipped(const PhotoBand& band, const LightSet& set, Place place, LeastSquaresBlock& block) {
+    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); ++i) {
+        if (block.clipped.at[i] == 0.0F || block.usable.at[i] == 0.0F) continue;
+        const UnclippedPixel pixel(band, set, place, block, i);
+        if (const auto g = pixel.solve()) pixel.put(*g, block);
     }
 }
 
-/// g of one pixel from its unclipped samples; no value where these do not determine it well.
-std::optional<Eigen::Vector3f> solve_unclipped(const PhotoStack& stack, const LightSet& set, int row, int column) {
-    Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d projected = Eigen::Vector3d::Zero();
-    int samples = 0;
-    for (const SolverLight& light : set.lights) {
-        if (stack.clipped[light.image](row, column) != 0) continue;
-        const Eigen::Vector3d direction = light.direction.cast<double>();
-        const float mean = channel_mean(stack.images[light.image].ptr<float>(row, column), light);
-        moments += direction * direction.transpose();
-        projected += direction * static_cast<double>(mean);
-        ++samples;
-    }
-    if (samples < 3) return std::nullopt;
-    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
-    eigen.computeDirect(moments, Eigen::EigenvaluesOnly);
-    const double limit = max_condition_growth * set.condition_number;
-    if (!(eigen.eigenvalues()[2] <= limit * limit * eigen.eigenvalues()[0])) return std::nullopt;
-    return (moments.inverse() * projected).cast<float>();
-}
-
-void leave_out_clipped(const PhotoStack& stack, const LightSet& set, int row, Planes& planes) {
-    for (int i = 0; i < planes.span.size(); ++i) {
-        if (planes.clipped[static_cast<std::size_t>(i)] == 0) continue;
-        if (const auto g = solve_unclipped(stack, set, row, planes.span.begin + i)) {
-            planes.gx()[i] = g->x();
-            planes.gy()[i] = g->y();
-            planes.gz()[i] = g->z();
-            planes.excluded[static_cast<std::size_t>(i)] = 1;
-        }
+void write_flags(const LeastSquaresBlock& block, uchar* valid, ushort* lights_used) {
+    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); ++i) {
+        const bool is_valid = block.usable.at[i] > 0.0F;
+        valid[i] = is_valid ? 255 : 0;
+        lights_used[i] = is_valid ? static_cast<ushort>(block.samples_used.at[i]) : ushort{0};
     }
 }
 
-/// The sums behind albedo and residual. They use g where N is meant: the scale |g| cancels in finish_pixel().
-void accumulate_albedo(const PhotoStack& stack, const LightSet& set, int row, Planes& planes) {
-    const int n = planes.span.size();
-    const float *gx = planes.gx(), *gy = planes.gy(), *gz = planes.gz();
-    float *colour = planes.colour.data(), *lit_weight = planes.lit_weight.data(), *squared = planes.squared.data();
-    const uchar* excluded = planes.excluded.data();
-    for (const SolverLight& light : set.lights) {
-        const float* rgb = pixels(stack, light, row, planes.span);
-        const uchar* clipped = clipping(stack, light, row, planes.span);
-        const Eigen::Vector3f l = light.direction;
-        for (int i = 0; i < n; ++i) {
-            const float kept = (excluded[i] != 0 && clipped[i] != 0) ? 0.0F : 1.0F;
-            const float shading = gx[i] * l.x() + gy[i] * l.y() + gz[i] * l.z();
-            const float lit = kept * std::max(shading, 0.0F);
-            const float error = kept * (channel_mean(rgb + std::ptrdiff_t{3} * i, light) - shading);
-            for (std::ptrdiff_t c = 0; c < 3; ++c)
-                colour[3 * i + c] += rgb[3 * i + c] * light.gain[static_cast<std::size_t>(c)] * lit;
-            lit_weight[i] += lit * lit;
-            squared[i] += error * error;
-        }
-    }
-}
-
-/// Writes one pixel; true when it is valid.
-bool finish_pixel(Planes& planes, int i, int samples, float min_albedo, int row, SolvedMaps& maps) {
-    const Eigen::Vector3f g = planes.g_at(i);
-    const float length = g.norm();
-    const auto at = static_cast<std::size_t>(i);
-    if (!(length > 0) || !(planes.lit_weight[at] > 0)) return false;
-    const float scale = length / planes.lit_weight[at];
-    const cv::Vec3f albedo(planes.colour[3 * at] * scale, planes.colour[3 * at + 1] * scale,
-                           planes.colour[3 * at + 2] * scale);
-    if (!((albedo[0] + albedo[1] + albedo[2]) / 3.0F >= min_albedo)) return false;
-
-    const int column = planes.span.begin + i;
-    maps.normal(row, column) = cv::Vec3f(g.x() / length, g.y() / length, g.z() / length);
-    maps.albedo(row, column) = albedo;
-    maps.valid(row, column) = 255;
-    maps.residual(row, column) = std::sqrt(planes.squared[at] / static_cast<float>(samples));
-    maps.lights_used(row, column) = static_cast<uchar>(std::min(samples, 255));
-    return true;
+void write_nothing(Place place, int row, int count, SolvedMaps& maps) {
+    const int c = place.column;
+    std::fill_n(maps.normal[row] + c, count, cv::Vec3f::all(0));
+    std::fill_n(maps.albedo[row] + c, count, cv::Vec3f::all(0));
+    std::fill_n(maps.residual[row] + c, count, 0.0F);
+    std::fill_n(maps.valid[row] + c, count, uchar{0});
+    std::fill_n(maps.lights_used[row] + c, count, ushort{0});
 }
 
 }  // namespace
 
-SolvedMaps::SolvedMaps(cv::Size size)
-    : normal(size, cv::Vec3f::all(0)),
-      albedo(size, cv::Vec3f::all(0)),
-      valid(size, uchar{0}),
-      residual(size, 0.0F),
-      lights_used(size, uchar{0}) {}
+SolvedMaps::SolvedMaps(cv::Size size) : normal(size), albedo(size), valid(size), residual(size), lights_used(size) {}
 
-RowSums solve_row_least_squares(const PhotoStack& stack, const LightSet& set, float min_albedo, int row,
-                                SolvedMaps& maps) {
-    RowSums sums;
-    Planes planes(masked_span(stack.mask, row));
-    accumulate_all_lights(stack, set, row, planes);
+std::size_t SolvedMaps::bytes_per_pixel() {
+    return 2 * sizeof(cv::Vec3f) + sizeof(uchar) + sizeof(float) + sizeof(ushort);
+}
 
-    // A sample that is not finite leaves its trace in g; it is looked for before clipped samples are dropped, so that
-    // such a pixel is never half used.
-    std::vector<uchar> usable(static_cast<std::size_t>(planes.span.size()));
-    for (int i = 0; i < planes.span.size(); ++i) {
-        if (stack.mask(row, planes.span.begin + i) == 0) continue;
-        const bool finite = planes.g_at(i).allFinite();
-        usable[static_cast<std::size_t>(i)] = finite;
-        sums.not_finite += !finite;
+std::size_t solve_row_least_squares(const PhotoBand& band, const LightSet& set, float min_albedo, int row,
+                                    SolvedMaps& maps) {
+    std::size_t not_finite = 0;
+    const int map_row = band.first_row + row;
+    LeastSquaresBlock block(set.lights.size());
+    for (Place place{row, 0}; place.column < band.cols(); place.column += block_pixels) {
+        const int c = place.column;
+        block.count = std::min(block_pixels, band.cols() - c);
+        if (empty_of_object(band, place, block.count)) {
+            write_nothing(place, map_row, block.count, maps);
+            continue;
+        }
+        load(band, set, place, block);
+        project(set, block);
+        not_finite += find_usable(band, place, block);
+        accumulate_albedo(set, block);
+        leave_out_clipped(band, set, place, block);
+        finish(min_albedo, block,
+               {maps.normal[map_row][c].val, maps.albedo[map_row][c].val, maps.residual[map_row] + c});
+        write_flags(block, maps.valid[map_row] + c, maps.lights_used[map_row] + c);
     }
-    leave_out_clipped(stack, set, row, planes);
-    accumulate_albedo(stack, set, row, planes);
-
-    const int lights = static_cast<int>(set.lights.size());
-    for (int i = 0; i < planes.span.size(); ++i) {
-        const auto at = static_cast<std::size_t>(i);
-        const int samples = planes.excluded[at] ? lights - planes.clipped[at] : lights;
-        if (!usable[at] || !finish_pixel(planes, i, samples, min_albedo, row, maps)) continue;
-        sums.squared_residual += static_cast<double>(planes.squared[at]);
-        sums.samples += static_cast<std::size_t>(samples);
-        ++sums.pixels;
-    }
-    return sums;
+    return not_finite;
 }
 
 }  // namespace darkbox

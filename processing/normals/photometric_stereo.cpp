@@ -3,51 +3,135 @@
 #include <fmt/format.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+#include <tbb/parallel_reduce.h>
 
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <vector>
 
 #include "acquisition/frame/error.h"
 #include "processing/maps/parallel.h"
+#include "processing/normals/bands.h"
 #include "processing/normals/least_squares.h"
 #include "processing/normals/light_set.h"
 
 namespace darkbox {
 namespace {
 
-void require_matching(const PhotoStack& stack, const Lights& lights) {
-    require_consistent(stack);
-    if (lights.size() != stack.images.size())
-        throw InputError(fmt::format("there are {} photographs but {} lights", stack.images.size(), lights.size()),
-                         "give one light for each photograph, in the same order");
-}
+/// Solves bands one after the other into the maps of the whole picture.
+class BandSolver {
+public:
+    BandSolver(const LightSet& set, const PhotometricStereoOptions& options, const WorkContext& work, SolvedMaps& maps)
+        : set_(set), options_(options), work_(work), maps_(maps) {}
 
-/// Every row once, on as many threads as asked for. A row's sums have a place of their own, so that adding them up
-/// afterwards does not depend on which thread came first.
-std::vector<RowSums> solve_rows(const PhotoStack& stack, const LightSet& set, const PhotometricStereoOptions& options,
-                                const WorkContext& work, SolvedMaps& maps) {
-    std::vector<RowSums> sums(static_cast<std::size_t>(stack.mask.rows));
-    on_threads_of(work, [&] {
-        tbb::parallel_for(tbb::blocked_range<int>(0, stack.mask.rows), [&](const tbb::blocked_range<int>& rows) {
-            for (int row = rows.begin(); row < rows.end() && !work.cancelled(); ++row)
-                sums[static_cast<std::size_t>(row)] =
-                    solve_row_least_squares(stack, set, options.min_albedo, row, maps);
+    void solve(const PhotoBand& band) {
+        mask_known_ = !band.mask.empty();
+        tbb::parallel_for(tbb::blocked_range<int>(0, band.rows()), [&](const tbb::blocked_range<int>& rows) {
+            const auto start = std::chrono::steady_clock::now();
+            for (int row = rows.begin(); row < rows.end() && !work_.cancelled(); ++row)
+                not_finite_ += solve_row(band, row);
+            busy_ += std::chrono::steady_clock::duration(std::chrono::steady_clock::now() - start).count();
         });
-    });
+    }
+
+    /// The bands came with their mask.
+    bool mask_known() const { return mask_known_; }
+    std::size_t not_finite() const { return not_finite_; }
+    double busy_seconds() const {
+        return std::chrono::duration<double>(std::chrono::steady_clock::duration(busy_)).count();
+    }
+
+private:
+    std::size_t solve_row(const PhotoBand& band, int row) {
+        return solve_row_least_squares(band, set_, options_.min_albedo, row, maps_);
+    }
+
+    const LightSet& set_;
+    const PhotometricStereoOptions& options_;
+    const WorkContext& work_;
+    SolvedMaps& maps_;
+    bool mask_known_ = true;
+    std::atomic<std::size_t> not_finite_ = 0;
+    std::atomic<std::chrono::steady_clock::rep> busy_ = 0;
+};
+
+void stop_if_wished(const WorkContext& work) {
     if (work.cancelled()) throw Cancelled("photometric stereo was cancelled", "run it again to get normals");
-    return sums;
 }
 
-RowSums total(const std::vector<RowSums>& rows) {
-    RowSums sum;
-    for (const RowSums& row : rows) {
-        sum.squared_residual += row.squared_residual;
-        sum.samples += row.samples;
-        sum.pixels += row.pixels;
-        sum.not_finite += row.not_finite;
+/// Reads band after band, each while the one before it is solved.
+void solve_bands(PhotoSource& photos, int band_rows, const WorkContext& work, BandSolver& solver) {
+    const int rows = photos.size().height;
+    PhotoBand current, next;
+    photos.read_next(std::min(band_rows, rows), current);
+    for (int solved = 0; solved < rows;) {
+        work.tell({"normals", static_cast<std::size_t>(solved), static_cast<std::size_t>(rows), ""});
+        stop_if_wished(work);
+        solved += current.rows();
+        if (const int coming = std::min(band_rows, rows - solved); coming > 0)
+            tbb::parallel_invoke([&] { photos.read_next(coming, next); }, [&] { solver.solve(current); });
+        else
+            solver.solve(current);
+        std::swap(current, next);
     }
-    return sum;
+    stop_if_wished(work);
+    work.tell({"normals", static_cast<std::size_t>(rows), static_cast<std::size_t>(rows), ""});
+}
+
+/// Takes back what was solved outside the mask, where it became known only afterwards.
+void keep_inside(const cv::Mat1b& mask, SolvedMaps& maps) {
+    cv::Mat1b outside;
+    cv::compare(mask, 0, outside, cv::CMP_EQ);
+    for (cv::Mat* map :
+         std::initializer_list<cv::Mat*>{&maps.normal, &maps.albedo, &maps.valid, &maps.residual, &maps.lights_used})
+        map->setTo(cv::Scalar::all(0), outside);
+}
+
+/// Over valid pixels; rows are summed up in their order, so that the figure does not depend on threads.
+void sum_up(const SolvedMaps& maps, PhotometricStereoResult& result) {
+    struct RowSums {
+        double squared = 0;
+        std::size_t samples = 0, pixels = 0;
+    };
+    std::vector<RowSums> rows(static_cast<std::size_t>(maps.valid.rows));
+    tbb::parallel_for(0, maps.valid.rows, [&](int y) {
+        RowSums& sums = rows[static_cast<std::size_t>(y)];
+        for (int x = 0; x < maps.valid.cols; ++x) {
+            const double residual = static_cast<double>(maps.residual(y, x));
+            sums.squared += residual * residual * maps.lights_used(y, x);
+            sums.samples += maps.lights_used(y, x);
+            sums.pixels += maps.valid(y, x) != 0 ? 1 : 0;
+        }
+    });
+    RowSums total;
+    for (const RowSums& row : rows) {
+        total.squared += row.squared;
+        total.samples += row.samples;
+        total.pixels += row.pixels;
+    }
+    result.pixels = total.pixels;
+    if (total.samples > 0) result.residual_rms = std::sqrt(total.squared / static_cast<double>(total.samples));
+}
+
+PhotometricStereoResult solve(PhotoSource& photos, const LightSet& set, const PhotometricStereoOptions& options,
+                              const WorkContext& work) {
+    const int band_rows = rows_of_a_band(photos, options);
+    SolvedMaps maps(photos.size());
+    BandSolver solver(set, options, work, maps);
+    solve_bands(photos, band_rows, work, solver);
+    if (!solver.mask_known()) keep_inside(photos.mask(), maps);
+
+    PhotometricStereoResult result;
+    sum_up(maps, result);
+    result.normals = {maps.normal, maps.valid};
+    result.albedo = {maps.albedo, maps.valid.clone()};
+    result.residual = maps.residual;
+    result.lights_used = maps.lights_used;
+    result.not_finite = solver.not_finite();
+    result.seconds = solver.busy_seconds() / tbb::this_task_arena::max_concurrency();
+    return result;
 }
 
 }  // namespace
@@ -55,31 +139,25 @@ RowSums total(const std::vector<RowSums>& rows) {
 void PhotometricStereoOptions::validate() const {
     if (!(std::isfinite(min_albedo) && min_albedo >= 0.0F))
         throw InputError(fmt::format("min_albedo is {}", min_albedo), "allowed: 0 or more (1.0 = full scale)");
+    if (memory_mib < 1) throw InputError(fmt::format("memory_mib is {}", memory_mib), "allowed: 1 or more");
+    if (band_rows < 0)
+        throw InputError(fmt::format("band_rows is {}", band_rows), "allowed: 1 or more, or 0 for as many as fit");
+}
+
+PhotometricStereoResult photometric_stereo(PhotoSource& photos, const Lights& lights,
+                                           const PhotometricStereoOptions& options, const WorkContext& work) {
+    options.validate();
+    if (lights.size() != photos.count())
+        throw InputError(fmt::format("there are {} photographs but {} lights", photos.count(), lights.size()),
+                         "give one light for each photograph, in the same order");
+    const LightSet set = LightSet::from(lights);
+    return on_threads_of(work, [&] { return solve(photos, set, options, work); });
 }
 
 PhotometricStereoResult photometric_stereo(const PhotoStack& stack, const Lights& lights,
                                            const PhotometricStereoOptions& options, const WorkContext& work) {
-    options.validate();
-    require_matching(stack, lights);
-    const LightSet set = LightSet::from(lights);
-
-    const auto start = std::chrono::steady_clock::now();
-    const auto rows = static_cast<std::size_t>(stack.mask.rows);
-    work.tell({"normals", 0, rows, ""});
-    SolvedMaps maps(stack.size());
-    const RowSums sums = total(solve_rows(stack, set, options, work, maps));
-    work.tell({"normals", rows, rows, ""});
-
-    PhotometricStereoResult result;
-    result.normals = {maps.normal, maps.valid};
-    result.albedo = {maps.albedo, maps.valid.clone()};
-    result.residual = maps.residual;
-    result.lights_used = maps.lights_used;
-    result.pixels = sums.pixels;
-    result.not_finite = sums.not_finite;
-    if (sums.samples > 0) result.residual_rms = std::sqrt(sums.squared_residual / static_cast<double>(sums.samples));
-    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    return result;
+    PhotosInMemory photos(stack);
+    return photometric_stereo(photos, lights, options, work);
 }
 
 }  // namespace darkbox

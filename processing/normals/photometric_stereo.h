@@ -5,6 +5,7 @@
 
 #include "acquisition/frame/progress.h"
 #include "processing/maps/maps.h"
+#include "processing/maps/photo_source.h"
 
 namespace darkbox {
 
@@ -13,6 +14,11 @@ enum class Solver { lsq };
 struct PhotometricStereoOptions {
     Solver solver = Solver::lsq;
     float min_albedo = 1e-4F;  ///< pixels with a smaller mean albedo are not valid (1.0 = full scale)
+    /// Memory for photographs' samples and the maps made from them, MiB. The maps are held whole (about 31 bytes a
+    /// pixel, 4 more where the mask is to be found); what remains bounds the height of the two bands in memory. It does
+    /// not change results.
+    int memory_mib = 2048;
+    int band_rows = 0;  ///< rows of a band; 0: as memory_mib allows. It does not change results.
 
     /// Throws InputError that names the field and the allowed range.
     void validate() const;
@@ -22,17 +28,23 @@ struct PhotometricStereoResult {
     NormalMap normals;
     AlbedoMap albedo;
     cv::Mat1f residual;          ///< RMS over lights of (I - rho N.L), linear radiance
-    cv::Mat1b lights_used;       ///< photographs behind each pixel
+    cv::Mat1w lights_used;       ///< photographs behind each pixel
     double residual_rms = 0;     ///< over all valid pixels
     std::size_t pixels = 0;      ///< valid ones
     std::size_t not_finite = 0;  ///< pixels of the mask left out for a sample that is not a finite number
-    double seconds = 0;          ///< of solving
+    double seconds = 0;          ///< of solving alone: busy time of all threads over their number
 };
 
 /// Least squares on I = rho N.L over all used lights (Woodham 1980, Optical Engineering 19(1); thesis, photometric
 /// stereo). Normals from the channel mean; albedo per channel as the least-squares factor of N.L, given the normal,
-/// over lit samples. Each photograph is divided by its light's intensity. Bit-identical on any number of threads.
-/// Throws InputError as require_consistent() and require_solvable() do.
+/// over lit samples. Each photograph is divided by its light's intensity.
+///
+/// Works by bands of rows: while one band is solved the next is read. Bit-identical on any number of threads and for
+/// any height of the bands. Throws InputError as the source and require_solvable() do, when lights and photographs
+/// differ in number, and when memory_mib holds not even two rows.
+PhotometricStereoResult photometric_stereo(PhotoSource& photos, const Lights& lights,
+                                           const PhotometricStereoOptions& options = {}, const WorkContext& work = {});
+/// The same for photographs in memory.
 PhotometricStereoResult photometric_stereo(const PhotoStack& stack, const Lights& lights,
                                            const PhotometricStereoOptions& options = {}, const WorkContext& work = {});
 
