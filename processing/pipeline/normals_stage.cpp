@@ -7,6 +7,7 @@
 #include "processing/formats/srgb.h"
 #include "processing/normals/integrate.h"
 #include "processing/pipeline/angular_error.h"
+#include "processing/pipeline/frame_tally.h"
 #include "processing/pipeline/session_files.h"
 #include "processing/pipeline/stack.h"
 #include "processing/pipeline/stages.h"
@@ -78,6 +79,9 @@ NormalsSummary run_normals(const Session& session, const PhotometricStereoOption
     if (const auto curve = doubtful_curve(session))
         if (const auto warning = transfer_warning(stack, lights, *curve, solved.residual_rms, work))
             summary.warnings.push_back(*warning);
+    FrameTally tally;
+    tally.add(stack);
+    for (std::string& warning : tally.warnings(lights)) summary.warnings.push_back(std::move(warning));
     watch.lap();
     remove_derived(session, {"texels", "shading"});
     write_maps(files, solved, work);
