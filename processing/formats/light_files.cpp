@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <span>
 
@@ -133,6 +134,7 @@ Light light_in(const fs::path& path, const Line& line, LightFileForm form) {
     }
     light.direction = vector_in(path, line, words);
     const double norm = light.direction.norm();
+    if (!std::isfinite(norm)) throw bad_line(path, line.number, "the vector is too long to have a length");
     if (norm < shortest_vector)
         throw bad_line(path, line.number,
                        fmt::format("the vector's length is {:.2g}, too short for a direction", norm));
@@ -154,6 +156,18 @@ void require_count(const fs::path& path, const Line& first, std::size_t found) {
     const std::size_t told = *count_in(first);
     if (told != found)
         throw bad_line(path, first.number, fmt::format("it announces {} lights, but {} follow", told, found));
+}
+
+/// Two lines for one photograph contradict each other, and nobody can say which of them holds.
+void require_different_names(const fs::path& path, const std::vector<Line>& lines, const Lights& lights) {
+    std::map<std::string, std::size_t> line_of;
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+        const auto [known, added] = line_of.emplace(lights[i].file, lines[i].number);
+        if (!added)
+            throw InputError(fmt::format("{} names {} twice, in lines {} and {}", path.string(), lights[i].file,
+                                         known->second, lines[i].number),
+                             "give each photograph one line");
+    }
 }
 
 bool any_decimal_comma(const std::vector<Line>& lines) {
@@ -181,6 +195,7 @@ LightFile read_lights(const fs::path& path) {
         light.direction.normalize();
         file.lights.push_back(light);
     }
+    if (file.form == LightFileForm::lp) require_different_names(path, lines, file.lights);
     if (any_decimal_comma(lines))
         file.warnings.push_back(fmt::format("{} has decimal commas; they were read as points", path.string()));
     if (!unit_length)

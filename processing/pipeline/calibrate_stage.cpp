@@ -102,6 +102,19 @@ void require_highlights(const Calibration& calibration, const std::vector<std::s
                     unread[0], unread[0]));
 }
 
+/// Lights that no ball tells are left out by their frames' names as well.
+void leave_out(Calibration& calibration, const std::vector<std::string>& dropped) {
+    for (const std::string& file : dropped) {
+        const auto light = std::find_if(calibration.lights.begin(), calibration.lights.end(),
+                                        [&](const Light& l) { return l.file == file; });
+        if (light == calibration.lights.end())
+            throw InputError(fmt::format("there is no frame {} to leave out", file),
+                             fmt::format("name a frame as {} is named", calibration.lights.front().file));
+        light->used = false;
+    }
+    calibration.condition_number = condition_number(calibration.lights);
+}
+
 void append(std::vector<std::string>& to, std::vector<std::string> more) {
     to.insert(to.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
 }
@@ -138,7 +151,10 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
         const BallView view = view_of_balls(ball.frames, summary.calibration.balls);
         write_png(files.ball_picture, draw_balls(view, summary.calibration));
     }
-    if (options.from || given) append(summary.calibration.warnings, warnings_about(summary.calibration));
+    if (options.from || given) {
+        leave_out(summary.calibration, options.calibration.drop);
+        append(summary.calibration.warnings, warnings_about(summary.calibration));
+    }
     warn_of_few_lights(summary.calibration);
     remove_derived(session, {"results", "texels", "shading"});
     write_calibration(files.calibration, summary.calibration, lamps_of(lit));

@@ -3,92 +3,193 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
-#include <numeric>
-#include <vector>
+#include <utility>
 
 #include "acquisition/frame/error.h"
+#include "processing/formats/json_file.h"
 #include "processing/formats/light_files.h"
 #include "processing/formats/map_files.h"
+#include "processing/normals/solver_names.h"
+#include "processing/pipeline/ideal_sphere.h"
+#include "processing/pipeline/session_files.h"
+#include "processing/pipeline/stack.h"
 #include "processing/pipeline/stages.h"
+#include "processing/pipeline/steps.h"
 
 namespace darkbox {
 namespace {
 
 namespace fs = std::filesystem;
 
-AngularError summarise(std::vector<double> angles_deg) {
-    std::sort(angles_deg.begin(), angles_deg.end());
-    const auto at = [&](double share) {
-        return angles_deg[static_cast<std::size_t>(share * static_cast<double>(angles_deg.size() - 1))];
-    };
-    AngularError error;
-    error.count = angles_deg.size();
-    error.mean_deg = std::accumulate(angles_deg.begin(), angles_deg.end(), 0.0) / static_cast<double>(error.count);
-    error.median_deg = at(0.5);
-    error.p95_deg = at(0.95);
-    return error;
-}
-
-Eigen::Vector3d to_eigen(const cv::Vec3f& v) { return {v[0], v[1], v[2]}; }
-
-std::optional<NormalMap> true_normals(const Session& session) {
-    for (const std::string& extra : session.extras())
-        if (extra.ends_with(".mat")) return read_normal_truth(session.path_of_extra(extra));
+std::optional<NormalMap> known_normals(const Session& session) {
+    if (const auto given = extra_of(session, given_truth)) return read_normal_truth(*given);
     const fs::path simulated = session.folder() / "truth" / "normals.exr";
     if (fs::exists(simulated)) return read_normal_map(simulated);
     return std::nullopt;
 }
 
-std::optional<AngularError> light_error(const Session& session, const fs::path& truth_file) {
+std::optional<fs::path> known_lights(const Session& session, const EvaluateOptions& options) {
+    if (options.reference_lights) return options.reference_lights;
+    const fs::path simulated = session.folder() / "truth" / "lights.lp";
+    return fs::exists(simulated) ? std::optional(simulated) : std::nullopt;
+}
+
+std::optional<LightErrors> light_errors(const Lights& computed, const fs::path& truth_file) {
     const Lights truth = read_lights(truth_file).lights;
-    const Lights computed = load_lights(session);
     if (truth.size() != computed.size())
         throw InputError(fmt::format("{} has {} lights but the calibration has {}", truth_file.string(), truth.size(),
                                      computed.size()),
-                         "calibrate the session again");
-    std::vector<double> angles_deg;
-    for (std::size_t i = 0; i < truth.size(); ++i)
-        if (computed[i].used) angles_deg.push_back(angle_deg(truth[i].direction, computed[i].direction));
-    if (angles_deg.empty()) return std::nullopt;
-    return summarise(std::move(angles_deg));
+                         "give one light for each photograph, in their order, or calibrate the session again");
+    LightErrors errors;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+        if (!computed[i].used) continue;
+        errors.files.push_back(computed[i].file);
+        errors.error_deg.push_back(angle_deg(truth[i].direction, computed[i].direction));
+    }
+    const auto all = summarise_angles(errors.error_deg);
+    if (!all) return std::nullopt;
+    errors.all = *all;
+    return errors;
+}
+
+Lights lights_without(Lights lights, const std::vector<std::string>& dropped) {
+    for (const std::string& file : dropped) {
+        const auto light = std::find_if(lights.begin(), lights.end(), [&](const Light& l) { return l.file == file; });
+        if (light == lights.end())
+            throw InputError(fmt::format("there is no frame {} to leave out", file),
+                             lights.empty() ? "the session has no lights"
+                                            : fmt::format("name a frame as {} is named", lights.front().file));
+        light->used = false;
+    }
+    return lights;
+}
+
+Solver solver_of_results(const ResultFiles& files) {
+    if (!fs::exists(files.results_summary)) return Solver::lsq;
+    const auto json = read_json(files.results_summary);
+    return reading_keys(files.results_summary, "a summary of normals",
+                        [&] { return solver_named(json.at("solver").get<std::string>()); });
+}
+
+PhotometricStereoOptions solving_with(Solver solver) {
+    PhotometricStereoOptions options;
+    options.solver = solver;
+    return options;
+}
+
+/// The session's photographs are read, and solved, only when something asks for them.
+class Bench {
+public:
+    Bench(const Session& session, const EvaluateOptions& options, const WorkContext& work)
+        : session_(session), options_(options), work_(work), files_(session.folder()) {
+        lights_ = lights_without(load_lights(session), options.drop);
+        solver_ = options.solver ? *options.solver : solver_of_results(files_);
+    }
+
+    const Lights& lights() const { return lights_; }
+    Solver solver() const { return solver_; }
+
+    const PhotoStack& stack() {
+        if (!stack_) stack_ = load_stack(session_, work_);
+        return *stack_;
+    }
+
+    PhotometricStereoResult solve(Solver solver) {
+        const PhotoStack& photographs = stack();
+        step(work_, {"solving normals", 0, 1, std::string(name(solver))});
+        return photometric_stereo(photographs, lights_, solving_with(solver), work_);
+    }
+
+    NormalMap normals() {
+        const bool stored = !options_.solver && options_.drop.empty() && fs::exists(files_.normals);
+        return stored ? read_normal_map(files_.normals) : solve(solver_).normals;
+    }
+
+private:
+    const Session& session_;
+    const EvaluateOptions& options_;
+    const WorkContext& work_;
+    ResultFiles files_;
+    Lights lights_;
+    Solver solver_ = Solver::lsq;
+    std::optional<PhotoStack> stack_;
+};
+
+/// Throws where it was asked for and is not to be had.
+std::optional<NormalMap> truth_of_normals(const Session& session, const EvaluateOptions& options, Bench& bench,
+                                          Evaluation& evaluation) {
+    if (options.truth == NormalTruth::ideal_sphere) {
+        IdealSphere sphere = ideal_sphere(bench.stack().mask);
+        evaluation.ideal_sphere = sphere.outline;
+        return std::move(sphere.normals);
+    }
+    auto truth = known_normals(session);
+    if (!truth && !options.compare.empty())
+        throw InputError(fmt::format("no true normals are known of {}", session.folder().string()),
+                         "solvers are compared on simulated captures, on imports with Normal_gt.mat, and on a matte "
+                         "ball with --ideal-sphere");
+    return truth;
+}
+
+std::vector<double> known_in_both(const cv::Mat1d& errors, const cv::Mat1d& others) {
+    std::vector<double> known;
+    for (int y = 0; y < errors.rows; ++y)
+        for (int x = 0; x < errors.cols; ++x)
+            if (!std::isnan(errors(y, x)) && !std::isnan(others(y, x))) known.push_back(errors(y, x));
+    return known;
+}
+
+SolverComparison compare_solvers(Bench& bench, const NormalMap& truth, const EvaluateOptions& options) {
+    const PhotometricStereoResult first = bench.solve(options.compare[0]);
+    const PhotometricStereoResult second = bench.solve(options.compare[1]);
+    const cv::Mat1d first_deg = angles_between_deg(first.normals, truth);
+    const cv::Mat1d second_deg = angles_between_deg(second.normals, truth);
+    SolverComparison comparison;
+    comparison.difference = paired_bootstrap(first_deg, second_deg, options.bootstrap);
+    comparison.first = {options.compare[0], *summarise_angles(known_in_both(first_deg, second_deg)), first.seconds};
+    comparison.second = {options.compare[1], *summarise_angles(known_in_both(second_deg, first_deg)), second.seconds};
+    return comparison;
+}
+
+void leave_lights_out(Bench& bench, const WorkContext& work, Evaluation& evaluation) {
+    const auto used =
+        std::count_if(bench.lights().begin(), bench.lights().end(), [](const Light& light) { return light.used; });
+    if (used < 4) {
+        evaluation.warnings.push_back(
+            fmt::format("{} lights are too few to leave one out: the others could not tell normals", used));
+        return;
+    }
+    const std::vector<Predictor> predictors{lambert_predictor()};
+    for (const Predictor& predictor : predictors) evaluation.predictors.push_back(predictor.name);
+    evaluation.held_out = leave_one_light_out(bench.stack(), bench.lights(), bench.solve(Solver::lsq), predictors,
+                                              solving_with(bench.solver()), work);
+    for (const HeldOutLight& light : evaluation.held_out)
+        if (light.errors.empty())
+            evaluation.warnings.push_back(
+                fmt::format("{} cannot be left out: the other lights lie in one plane", light.file));
 }
 
 }  // namespace
 
-AngularError angular_error(const NormalMap& computed, const NormalMap& truth) {
-    if (computed.normal.size() != truth.normal.size())
-        throw InputError(fmt::format("the normals are {} x {} pixels, the truth {} x {}", computed.normal.cols,
-                                     computed.normal.rows, truth.normal.cols, truth.normal.rows),
-                         "compare maps of one size");
-    std::vector<double> angles_deg;
-    for (int y = 0; y < truth.normal.rows; ++y)
-        for (int x = 0; x < truth.normal.cols; ++x)
-            if (computed.valid(y, x) && truth.valid(y, x))
-                angles_deg.push_back(angle_deg(to_eigen(computed.normal(y, x)), to_eigen(truth.normal(y, x))));
-    if (angles_deg.empty()) throw InputError("no pixel is valid in both normal maps", "do both show the same object?");
-    return summarise(std::move(angles_deg));
+void EvaluateOptions::validate() const {
+    bootstrap.validate();
+    if (!compare.empty() && compare.size() != 2)
+        throw InputError(fmt::format("compare names {} solvers", compare.size()), "allowed: none, or two");
 }
 
-Evaluation evaluate_session(const Session& session, const std::optional<fs::path>& reference_lights,
-                            const WorkContext& work) {
-    work.tell({"evaluate", 0, 0, session.folder().string()});
+Evaluation evaluate_session(const Session& session, const EvaluateOptions& options, const WorkContext& work) {
+    options.validate();
+    Bench bench(session, options, work);
     Evaluation evaluation;
-    if (const auto truth = true_normals(session)) {
-        const fs::path computed = session.folder() / "results" / "normals.exr";
-        if (!fs::exists(computed))
-            throw InputError(session.folder().string() + " has no normals yet",
-                             fmt::format("run: darkbox process {}", session.folder().string()));
-        evaluation.normals = angular_error(read_normal_map(computed), *truth);
+    evaluation.solver = bench.solver();
+    if (const auto truth = truth_of_normals(session, options, bench, evaluation)) {
+        evaluation.normals = angular_error(bench.normals(), *truth);
+        if (!options.compare.empty()) evaluation.comparison = compare_solvers(bench, *truth, options);
     }
-    const fs::path simulated_lights = session.folder() / "truth" / "lights.lp";
-    if (reference_lights)
-        evaluation.lights = light_error(session, *reference_lights);
-    else if (fs::exists(simulated_lights))
-        evaluation.lights = light_error(session, simulated_lights);
-    if (!evaluation.normals && !evaluation.lights)
-        throw InputError("no truth is known of " + session.folder().string(),
-                         "evaluate needs a simulated capture, an import with Normal_gt.mat, or --lights FILE");
+    if (const auto lights = known_lights(session, options)) evaluation.lights = light_errors(bench.lights(), *lights);
+    if (options.held_out) leave_lights_out(bench, work, evaluation);
     return evaluation;
 }
 

@@ -54,7 +54,6 @@ Inspected inspect(const fs::path& source, FrameKind kind, ImportTransfer transfe
     record.height = picture.samples.rows;
     record.bit_depth = picture.bit_depth;
     record.transfer = curve_of(picture, transfer);
-    record.lamp_name = source.filename().string();
     record.verification = "imported: read whole, not checked against a lamp";
     return inspected;
 }
@@ -67,20 +66,33 @@ void require_one_size(const Inspected& first, const Inspected& other) {
                          "give photographs of one camera in one place, all of one size");
 }
 
+void require_different(const std::vector<fs::path>& files) {
+    std::set<fs::path> seen;
+    for (const fs::path& file : files)
+        if (!seen.insert(fs::absolute(file).lexically_normal()).second)
+            throw InputError(fmt::format("{} is given twice", file.string()), "name each folder of photographs once");
+}
+
+/// The file's own name; where another has it already, with the names of its folders before it, as many as it takes.
+std::string unique_name(const fs::path& file, std::set<std::string>& names) {
+    const fs::path whole = fs::absolute(file).lexically_normal();
+    std::string name = whole.filename().string();
+    for (fs::path folder = whole.parent_path(); !names.insert(name).second; folder = folder.parent_path())
+        name = folder.filename().string() + "_" + name;
+    return name;
+}
+
 /// Every photograph is read once before anything is written, so that a bad one leaves no half session.
 std::vector<Inspected> inspect_all(const std::vector<fs::path>& files, FrameKind kind, const std::string& folder,
                                    const ImportOptions& options, const WorkContext& work) {
+    require_different(files);
     std::vector<Inspected> all;
     std::set<std::string> names;
     for (const fs::path& file : files) {
         step(work, {"reading photographs", all.size(), files.size(), file.filename().string()});
         Inspected one = inspect(file, kind, options.transfer);
-        std::string name = file.filename().string();
-        if (!names.insert(name).second) {
-            name = file.parent_path().filename().string() + "_" + name;
-            names.insert(name);
-        }
-        one.record.file = folder + name;
+        one.record.lamp_name = unique_name(file, names);
+        one.record.file = folder + one.record.lamp_name;
         one.record.lamp = LampId{static_cast<std::uint32_t>(all.size())};
         if (!all.empty()) require_one_size(all.front(), one);
         all.push_back(std::move(one));

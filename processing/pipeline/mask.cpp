@@ -20,12 +20,19 @@ cv::Mat1f brightest(const std::vector<cv::Mat3f>& images) {
     return most;
 }
 
+/// The greatest value that is not a single pixel's: one hot pixel of a float picture would make all others black.
+double peak_of(const cv::Mat1f& luminance) {
+    cv::Mat1f calm;
+    cv::medianBlur(luminance, calm, 3);
+    double peak = 0;
+    cv::minMaxLoc(calm, nullptr, &peak);
+    return std::max(peak, 1e-12);
+}
+
 /// Eight bits on a square-root scale, so that Otsu's threshold sees dark objects too.
 cv::Mat1b encoded(const cv::Mat1f& luminance) {
-    double peak = 0;
-    cv::minMaxLoc(luminance, nullptr, &peak);
     cv::Mat1f root;
-    cv::sqrt(luminance / std::max(peak, 1e-12), root);
+    cv::sqrt(cv::min(luminance / peak_of(luminance), 1.0), root);
     cv::Mat1b bytes;
     root.convertTo(bytes, CV_8U, 255.0);
     return bytes;

@@ -6,6 +6,8 @@
 #include "processing/formats/ply.h"
 #include "processing/formats/srgb.h"
 #include "processing/normals/integrate.h"
+#include "processing/pipeline/angular_error.h"
+#include "processing/pipeline/frame_tally.h"
 #include "processing/pipeline/session_files.h"
 #include "processing/pipeline/stack.h"
 #include "processing/pipeline/stages.h"
@@ -16,25 +18,14 @@
 namespace darkbox {
 namespace {
 
-/// Mean angle over the pixels where both are valid; no value where none are.
-std::optional<double> mean_angle_deg(const NormalMap& a, const NormalMap& b) {
-    if (a.normal.size() != b.normal.size()) return std::nullopt;
-    double sum = 0;
-    std::size_t count = 0;
-    for (int y = 0; y < a.normal.rows; ++y)
-        for (int x = 0; x < a.normal.cols; ++x) {
-            if (!a.valid(y, x) || !b.valid(y, x)) continue;
-            const cv::Vec3f &p = a.normal(y, x), &q = b.normal(y, x);
-            sum += angle_deg({p[0], p[1], p[2]}, {q[0], q[1], q[2]});
-            ++count;
-        }
-    if (count == 0) return std::nullopt;
-    return sum / static_cast<double>(count);
-}
-
+/// Truth of another size, or of nothing that was solved, is for evaluate to refuse: the normals are good without it.
 std::optional<double> error_against_truth(const Session& session, const NormalMap& normals) {
-    const auto truth = extra_of(session, given_truth);
-    return truth ? mean_angle_deg(normals, read_normal_truth(*truth)) : std::nullopt;
+    const auto file = extra_of(session, given_truth);
+    if (!file) return std::nullopt;
+    const NormalMap truth = read_normal_truth(*file);
+    if (truth.normal.size() != normals.normal.size() || cv::countNonZero(truth.valid & normals.valid) == 0)
+        return std::nullopt;
+    return angular_error(normals, truth).mean_deg;
 }
 
 /// The curve of 8-bit imports: the one choice that the pictures themselves can contradict.
@@ -88,6 +79,9 @@ NormalsSummary run_normals(const Session& session, const PhotometricStereoOption
     if (const auto curve = doubtful_curve(session))
         if (const auto warning = transfer_warning(stack, lights, *curve, solved.residual_rms, work))
             summary.warnings.push_back(*warning);
+    FrameTally tally;
+    tally.add(stack);
+    for (std::string& warning : tally.warnings(lights)) summary.warnings.push_back(std::move(warning));
     watch.lap();
     remove_derived(session, {"texels", "shading"});
     write_maps(files, solved, work);

@@ -91,13 +91,7 @@ Survey survey_rti(const fs::path& folder, const fs::path& lp, const std::vector<
     Survey survey;
     survey.layout = "RTI folder with " + lp.filename().string();
     survey.lights = lp;
-    for (const Light& light : read_lights(lp).lights) {
-        const fs::path frame = require_listed(folder, light.file, lp);
-        if (std::find(survey.frames.begin(), survey.frames.end(), frame) != survey.frames.end())
-            throw InputError(fmt::format("{} names {} twice", lp.string(), light.file),
-                             "give each photograph one line");
-        survey.frames.push_back(frame);
-    }
+    for (const Light& light : read_lights(lp).lights) survey.frames.push_back(require_listed(folder, light.file, lp));
     std::copy_if(files.begin(), files.end(), std::back_inserter(survey.masks),
                  [](const fs::path& file) { return picture_format_of(file) && is_mask_name(file); });
     return survey;

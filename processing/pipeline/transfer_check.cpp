@@ -9,6 +9,7 @@ namespace darkbox {
 namespace {
 
 constexpr double clearly_better = 0.75;
+constexpr double least_residual = 1e-3;  // of the mean radiance: below it either curve fits, or too few samples do
 
 double mean_radiance(const PhotoStack& stack) {
     double sum = 0;
@@ -42,7 +43,7 @@ std::optional<std::string> transfer_warning(const PhotoStack& stack, const Light
     const PhotoStack other = under_other_curve(stack, curve);
     const double chosen = residual_rms / mean_radiance(stack);
     const double instead = photometric_stereo(other, lights, {}, work).residual_rms / mean_radiance(other);
-    if (!(instead < clearly_better * chosen)) return std::nullopt;
+    if (!(chosen > least_residual && instead < clearly_better * chosen)) return std::nullopt;
     const bool srgb = curve == TransferCurve::srgb;
     return fmt::format(
         "the photographs were read as {0}, but fit Lambert's law better as {1} (residual {2:.1f} % of the "

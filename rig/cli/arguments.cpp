@@ -18,7 +18,7 @@ constexpr double shortest_direction = 1e-6;
 constexpr int jpeg_quality = 95;
 
 [[noreturn]] void malformed(const std::string& option, const std::string& text, const std::string& form) {
-    throw InputError(fmt::format("{} '{}' is not of the form {}", option, text, form), "see --help for an example");
+    throw InputError(fmt::format("{} '{}' is not {}", option, text, form), "see --help for an example");
 }
 
 }  // namespace
@@ -38,7 +38,7 @@ std::vector<double> parse_numbers(const std::string& option, const std::string& 
         }
         at = next + 1;
     }
-    malformed(option, text, fmt::format("of {} numbers with commas between them", count));
+    malformed(option, text, fmt::format("{} numbers with commas between them", count));
 }
 
 Ball parse_ball(const std::string& text) {
@@ -48,7 +48,7 @@ Ball parse_ball(const std::string& text) {
 
 std::pair<std::string, cv::Point2d> parse_highlight(const std::string& text) {
     const auto equals = text.rfind('=');
-    if (equals == std::string::npos || equals == 0) malformed("--highlight", text, "FRAME=X,Y");
+    if (equals == std::string::npos || equals == 0) malformed("--highlight", text, "of the form FRAME=X,Y");
     const auto n = parse_numbers("--highlight", text.substr(equals + 1), 2);
     return {text.substr(0, equals), {n[0], n[1]}};
 }

@@ -1,97 +1,18 @@
 // Bad input to the program as people run it: one clear error that names the thing and the remedy, status 1.
 
 #include <fmt/format.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
-#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "tests/rig/cli/program.h"
-#include "tests/support/test_data.h"
+#include "tests/rig/cli/bad_input.h"
 
 namespace darkbox::test {
 namespace {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
-
-constexpr int side = 96;
-
-struct Direction {
-    double x, y, z;
-};
-
-const std::vector<Direction> good_lights{{0.5, 0.3, 0.81}, {-0.5, 0.3, 0.81}, {0.0, -0.6, 0.8}, {0.1, 0.1, 0.99}};
-
-/// A matte ball of radius 40 in the middle, 8 bits.
-cv::Mat1b matte_ball(const Direction& l) {
-    cv::Mat1b image(side, side, uchar{0});
-    for (int v = 0; v < side; ++v)
-        for (int u = 0; u < side; ++u) {
-            const double x = (u - 48) / 40.0;
-            const double y = -(v - 48) / 40.0;
-            if (x * x + y * y >= 1) continue;
-            const double shade = x * l.x + y * l.y + std::sqrt(1 - x * x - y * y) * l.z;
-            image(v, u) = static_cast<uchar>(std::lround(200 * std::max(shade, 0.0)));
-        }
-    return image;
-}
-
-/// A mirror ball of radius 40 on a grey ground, with the lamp's highlight where reflection puts it.
-cv::Mat1b mirror_ball(const Direction& l, int highlight_value) {
-    cv::Mat1b image(side, side, uchar{40});
-    const double norm = std::sqrt(l.x * l.x + l.y * l.y + (l.z + 1) * (l.z + 1));
-    const double hu = 48 + 40 * l.x / norm;
-    const double hv = 48 - 40 * l.y / norm;
-    for (int v = 0; v < side; ++v)
-        for (int u = 0; u < side; ++u) {
-            if (std::hypot(u - 48, v - 48) < 40) image(v, u) = 5;
-            if (std::hypot(u - hu, v - hv) < 3) image(v, u) = static_cast<uchar>(highlight_value);
-        }
-    return image;
-}
-
-class BadInput : public testing::Test {
-protected:
-    fs::path path(const std::string& name) const { return folder_.path() / name; }
-
-    /// A folder of photographs of the matte ball under these lights.
-    std::string photographs(const std::string& name, const std::vector<Direction>& lights) {
-        fs::create_directories(path(name));
-        for (std::size_t i = 0; i < lights.size(); ++i)
-            cv::imwrite((path(name) / fmt::format("p{}.png", i)).string(), matte_ball(lights[i]));
-        return path(name).string();
-    }
-
-    std::string lights_file(const std::vector<Direction>& lights) {
-        std::ofstream file(path("lights.txt"));
-        file << lights.size() << "\n";
-        for (const Direction& l : lights) file << l.x << " " << l.y << " " << l.z << "\n";
-        return path("lights.txt").string();
-    }
-
-    /// A sealed session of a good capture with given lights.
-    std::string session() {
-        const auto r =
-            darkbox_program({"import", photographs("good", good_lights), "--lights", lights_file(good_lights),
-                             "--transfer", "linear", "--out", path("session").string()});
-        EXPECT_EQ(r.status, 0) << r.err;
-        return path("session").string();
-    }
-
-    static void expect_one_error(const ProgramResult& r, const std::string& names) {
-        EXPECT_EQ(r.status, 1) << r.err;
-        EXPECT_THAT(r.err, HasSubstr("error: "));
-        EXPECT_EQ(r.err.find("error: "), r.err.rfind("error: ")) << r.err;
-        EXPECT_THAT(r.err, HasSubstr(names));
-        EXPECT_EQ(r.out, "");
-    }
-
-    TemporaryFolder folder_;
-};
 
 TEST_F(BadInput, GoodInputWorks) {
     const std::string s = session();
@@ -126,16 +47,14 @@ TEST_F(BadInput, ImagesOfDifferentSizes) {
 
 TEST_F(BadInput, TwoLightsOnly) {
     const std::vector<Direction> two(good_lights.begin(), good_lights.begin() + 2);
-    const auto imported = darkbox_program({"import", photographs("photos", two), "--lights", lights_file(two),
-                                           "--transfer", "linear", "--out", path("s").string()});
+    const auto imported = import(photographs("photos", two), two);
     ASSERT_EQ(imported.status, 0) << imported.err;
     expect_one_error(darkbox_program({"process", path("s").string()}), "three lights");
 }
 
 TEST_F(BadInput, CoplanarLights) {
     const std::vector<Direction> flat{{-0.6, 0, 0.8}, {0, 0, 1}, {0.6, 0, 0.8}, {0.28, 0, 0.96}};
-    const auto imported = darkbox_program({"import", photographs("photos", flat), "--lights", lights_file(flat),
-                                           "--transfer", "linear", "--out", path("s").string()});
+    const auto imported = import(photographs("photos", flat), flat);
     ASSERT_EQ(imported.status, 0) << imported.err;
     expect_one_error(darkbox_program({"process", path("s").string()}), "one plane");
 }
@@ -221,10 +140,7 @@ TEST_F(BadInput, MalformedLightIsRefusedBeforeAnyWork) {
 
 TEST_F(BadInput, StrictTurnsWarningsIntoStatusThree) {
     const std::vector<Direction> near_plane{{-0.6, 0.01, 0.8}, {0, 0.03, 1}, {0.6, -0.02, 0.8}, {0.28, 0.02, 0.96}};
-    ASSERT_EQ(darkbox_program({"import", photographs("photos", near_plane), "--lights", lights_file(near_plane),
-                               "--transfer", "linear", "--out", path("s").string()})
-                  .status,
-              0);
+    ASSERT_EQ(import(photographs("photos", near_plane), near_plane).status, 0);
     EXPECT_EQ(darkbox_program({"calibrate", path("s").string()}).status, 0);
     EXPECT_EQ(darkbox_program({"calibrate", path("s").string(), "--strict"}).status, 3);
 }

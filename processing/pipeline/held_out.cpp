@@ -1,0 +1,226 @@
+#include "processing/pipeline/held_out.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "acquisition/frame/error.h"
+#include "processing/pipeline/angular_error.h"
+#include "processing/pipeline/steps.h"
+
+namespace darkbox {
+namespace {
+
+constexpr double shadow_share = 0.5;     // of what Lambert expects
+constexpr double highlight_share = 0.2;  // of the albedo, above what Lambert expects
+constexpr double hull_tolerance = 1e-6;  // of the plane's coordinates
+
+double mean_of(const cv::Vec3f& v) { return (static_cast<double>(v[0]) + v[1] + v[2]) / 3; }
+
+double n_dot_l(const cv::Vec3f& n, const Light& light) {
+    return light.direction.dot(Eigen::Vector3d(n[0], n[1], n[2]));
+}
+
+/// One pixel of a photograph as a light of intensity 1 would have made it, channel mean.
+double normalised(const cv::Vec3f& radiance, const Light& light) {
+    return (radiance[0] / light.intensity[0] + radiance[1] / light.intensity[1] + radiance[2] / light.intensity[2]) / 3;
+}
+
+PixelKind kind_of(double observed, double shading, double albedo) {
+    const double expected = albedo * std::max(shading, 0.0);
+    if (shading <= 0 || observed < shadow_share * expected) return PixelKind::shadowed;
+    return observed > expected + highlight_share * albedo ? PixelKind::highlight : PixelKind::lit;
+}
+
+/// The kind of each pixel of one photograph, as an index into pixel_kinds; `all` (0) where nothing is compared.
+cv::Mat1b kinds_of(const PhotoStack& stack, std::size_t image, const Light& light,
+                   const PhotometricStereoResult& reference) {
+    cv::Mat1b kinds(stack.size(), static_cast<uchar>(PixelKind::all));
+    for (int y = 0; y < kinds.rows; ++y)
+        for (int x = 0; x < kinds.cols; ++x) {
+            if (reference.normals.valid(y, x) == 0) continue;
+            const PixelKind kind =
+                stack.clipped[image](y, x) != 0
+                    ? PixelKind::highlight
+                    : kind_of(normalised(stack.images[image](y, x), light),
+                              n_dot_l(reference.normals.normal(y, x), light), mean_of(reference.albedo.albedo(y, x)));
+            kinds(y, x) = static_cast<uchar>(kind);
+        }
+    return kinds;
+}
+
+struct Sums {
+    double squared = 0;
+    std::size_t pixels = 0;
+};
+
+PredictionError error_from(const Sums& sums, double photograph_mean) {
+    const double mse = sums.squared / static_cast<double>(3 * sums.pixels);
+    return {std::sqrt(mse) / photograph_mean, -10 * std::log10(mse), sums.pixels};
+}
+
+double squared_error(const cv::Vec3f& predicted, const cv::Vec3f& observed, bool clipped) {
+    double sum = 0;
+    for (int c = 0; c < 3; ++c) {
+        const double error = static_cast<double>(predicted[c]) - observed[c];
+        if (!(clipped && error > 0)) sum += error * error;
+    }
+    return sum;
+}
+
+PredictionErrors compare(const cv::Mat3f& predicted, const cv::Mat3f& observed, const cv::Mat1b& clipped,
+                         const cv::Mat1b& kinds) {
+    std::array<Sums, pixel_kinds.size()> sums;
+    double brightness = 0;
+    for (int y = 0; y < kinds.rows; ++y)
+        for (int x = 0; x < kinds.cols; ++x) {
+            if (kinds(y, x) == static_cast<uchar>(PixelKind::all)) continue;
+            const double squared = squared_error(predicted(y, x), observed(y, x), clipped(y, x) != 0);
+            for (const std::size_t kind : {std::size_t{0}, std::size_t{kinds(y, x)}}) {
+                sums[kind].squared += squared;
+                ++sums[kind].pixels;
+            }
+            brightness += mean_of(observed(y, x));
+        }
+    PredictionErrors errors;
+    const double mean = brightness / static_cast<double>(std::max<std::size_t>(sums[0].pixels, 1));
+    for (std::size_t kind = 0; kind < sums.size(); ++kind)
+        if (sums[kind].pixels > 0 && mean > 0) errors[kind] = error_from(sums[kind], mean);
+    return errors;
+}
+
+bool solvable(const Lights& lights) {
+    try {
+        require_solvable(lights);
+        return true;
+    } catch (const InputError&) {
+        return false;
+    }
+}
+
+std::size_t count_used(const Lights& lights) {
+    return static_cast<std::size_t>(std::count_if(lights.begin(), lights.end(), [](const Light& l) { return l.used; }));
+}
+
+double mean_change_deg(const NormalMap& a, const NormalMap& b) {
+    if (cv::countNonZero(a.valid & b.valid) == 0) return 0;
+    return angular_error(a, b).mean_deg;
+}
+
+/// Coordinates in the plane across `axis`; no value for a direction that does not meet it.
+std::optional<cv::Point2f> gnomonic(const Eigen::Vector3d& direction, const Eigen::Vector3d& axis) {
+    const double along = direction.dot(axis);
+    if (along < 1e-3) return std::nullopt;
+    const Eigen::Vector3d right = axis.unitOrthogonal();
+    const Eigen::Vector3d up = axis.cross(right);
+    return cv::Point2f(static_cast<float>(direction.dot(right) / along), static_cast<float>(direction.dot(up) / along));
+}
+
+}  // namespace
+
+const char* name(PixelKind kind) {
+    switch (kind) {
+        case PixelKind::all:
+            return "all";
+        case PixelKind::lit:
+            return "lit";
+        case PixelKind::shadowed:
+            return "shadowed";
+        case PixelKind::highlight:
+            return "highlight";
+    }
+    return "";
+}
+
+Predictor lambert_predictor() {
+    return {"lambert", [](const HeldOutTraining& training, const Light& light) {
+                const PhotometricStereoResult& solved = training.solved;
+                cv::Mat3f image(training.stack.size(), cv::Vec3f::all(0));
+                for (int y = 0; y < image.rows; ++y)
+                    for (int x = 0; x < image.cols; ++x) {
+                        if (solved.normals.valid(y, x) == 0) continue;
+                        const double shading = std::max(0.0, n_dot_l(solved.normals.normal(y, x), light));
+                        const cv::Vec3f& albedo = solved.albedo.albedo(y, x);
+                        for (int c = 0; c < 3; ++c)
+                            image(y, x)[c] = static_cast<float>(albedo[c] * shading * light.intensity[c]);
+                    }
+                return image;
+            }};
+}
+
+PredictionErrors mean_errors(const std::vector<HeldOutLight>& lights, std::size_t predictor, LightGroup group) {
+    PredictionErrors means;
+    std::array<std::size_t, pixel_kinds.size()> counts{};
+    for (const HeldOutLight& light : lights) {
+        const bool inside = group == LightGroup::every || light.hull == (group == LightGroup::hull);
+        if (!inside || light.errors.empty()) continue;
+        for (std::size_t kind = 0; kind < means.size(); ++kind) {
+            const auto& error = light.errors[predictor][kind];
+            if (!error) continue;
+            if (!means[kind]) means[kind].emplace();
+            means[kind]->rmse_relative += error->rmse_relative;
+            means[kind]->psnr_db += error->psnr_db;
+            means[kind]->pixels += error->pixels;
+            ++counts[kind];
+        }
+    }
+    for (std::size_t kind = 0; kind < means.size(); ++kind)
+        if (means[kind]) {
+            means[kind]->rmse_relative /= static_cast<double>(counts[kind]);
+            means[kind]->psnr_db /= static_cast<double>(counts[kind]);
+        }
+    return means;
+}
+
+std::vector<bool> on_hull(const Lights& lights) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const Light& light : lights)
+        if (light.used) sum += light.direction;
+    const Eigen::Vector3d axis = sum.normalized();
+    std::vector<cv::Point2f> points;
+    for (const Light& light : lights)
+        if (const auto point = gnomonic(light.direction, axis); light.used && point) points.push_back(*point);
+    std::vector<cv::Point2f> hull;
+    if (!points.empty()) cv::convexHull(points, hull);
+    std::vector<bool> outside;
+    for (const Light& light : lights) {
+        const auto point = gnomonic(light.direction, axis);
+        outside.push_back(light.used &&
+                          (!point || hull.size() < 3 || cv::pointPolygonTest(hull, *point, true) < hull_tolerance));
+    }
+    return outside;
+}
+
+std::vector<HeldOutLight> leave_one_light_out(const PhotoStack& stack, const Lights& lights,
+                                              const PhotometricStereoResult& reference,
+                                              const std::vector<Predictor>& predictors,
+                                              const PhotometricStereoOptions& options, const WorkContext& work) {
+    if (count_used(lights) < 4)
+        throw InputError("with a light left out, fewer than three lights remain",
+                         "leaving one out needs at least four lights");
+    const PhotometricStereoResult whole = photometric_stereo(stack, lights, options, work);
+    const std::vector<bool> hull = on_hull(lights);
+    std::vector<HeldOutLight> results;
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+        if (!lights[i].used) continue;
+        step(work, {"leaving lights out", i, lights.size(), lights[i].file});
+        HeldOutLight& result = results.emplace_back();
+        result.file = lights[i].file;
+        result.hull = hull[i];
+        Lights others = lights;
+        others[i].used = false;
+        if (!solvable(others)) continue;
+        const PhotometricStereoResult solved =
+            photometric_stereo(stack, others, options, {.report = {}, .stop = work.stop, .threads = work.threads});
+        result.normal_change_deg = mean_change_deg(solved.normals, whole.normals);
+        const cv::Mat1b kinds = kinds_of(stack, i, lights[i], reference);
+        for (const Predictor& predictor : predictors)
+            result.errors.push_back(compare(predictor.predict({stack, others, solved}, lights[i]), stack.images[i],
+                                            stack.clipped[i], kinds));
+    }
+    step(work, {"leaving lights out", lights.size(), lights.size(), ""});
+    return results;
+}
+
+}  // namespace darkbox

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "acquisition/frame/progress.h"
+#include "processing/maps/maps.h"
+#include "processing/normals/photometric_stereo.h"
+
+namespace darkbox {
+
+// Leave one light out: everything is fitted again without one photograph, the photograph is predicted from its light,
+// and compared with the real one. It needs no truth, so that it tells of real captures what angular errors cannot.
+
+/// What a predictor may learn from.
+struct HeldOutTraining {
+    const PhotoStack& stack;                ///< the held-out photograph is in it, but its light is not `used`
+    const Lights& lights;                   ///< `used` is false for the held-out one
+    const PhotometricStereoResult& solved;  ///< fitted to the used ones
+};
+
+/// Draws the held-out photograph under `light`: linear radiance, of the stack's size. Names as `--json` shows them.
+struct Predictor {
+    std::string name;
+    std::function<cv::Mat3f(const HeldOutTraining& training, const Light& light)> predict;
+};
+
+/// "lambert": albedo times max(0, N.L) times the light's intensity.
+Predictor lambert_predictor();
+
+/// Every pixel of the object, and three kinds of them apart.
+enum class PixelKind {
+    all,
+    lit,        ///< neither of the others
+    shadowed,   ///< faces away from the light, or sends less than half of what Lambert expects
+    highlight,  ///< clipped, or sends more than Lambert expects by a fifth of its albedo
+};
+inline constexpr std::array<PixelKind, 4> pixel_kinds{PixelKind::all, PixelKind::lit, PixelKind::shadowed,
+                                                      PixelKind::highlight};
+const char* name(PixelKind kind);
+
+struct PredictionError {
+    double rmse_relative = 0;  ///< over pixels and channels, relative to the photograph's mean over all of the object
+    double psnr_db = 0;        ///< against full scale, 1.0
+    std::size_t pixels = 0;
+};
+
+/// One predictor's errors, in the order of pixel_kinds; no value where there are no such pixels.
+using PredictionErrors = std::array<std::optional<PredictionError>, pixel_kinds.size()>;
+
+struct HeldOutLight {
+    std::string file;
+    bool hull = false;  ///< outside the convex hull of the other lights' directions: predicting it extrapolates
+    std::vector<PredictionErrors> errors;  ///< one per predictor, in their order; empty: the others do not suffice
+    double normal_change_deg = 0;          ///< mean angle between the normals with and without this photograph
+};
+
+/// Pixels are compared where `reference`, a fit to all photographs, is valid; it also says which are lit, shadowed or
+/// highlights, so that the kinds are the same whatever is compared. A pixel that the refit cannot solve is predicted
+/// black. Where the photograph is clipped a brighter prediction is no error. Lights that are not used are passed over;
+/// a light without which the others have no unique solution gets no errors. Throws InputError as photometric_stereo()
+/// does, and for fewer than four used lights.
+std::vector<HeldOutLight> leave_one_light_out(const PhotoStack& stack, const Lights& lights,
+                                              const PhotometricStereoResult& reference,
+                                              const std::vector<Predictor>& predictors,
+                                              const PhotometricStereoOptions& options = {},
+                                              const WorkContext& work = {});
+
+/// Lights whose photographs are predicted between others, beyond them, or both.
+enum class LightGroup { every, interior, hull };
+/// One predictor's errors averaged over a group's lights that have them (its pixels: the sum).
+PredictionErrors mean_errors(const std::vector<HeldOutLight>& lights, std::size_t predictor, LightGroup group);
+
+/// For each used light whether it is outside or on the border of the convex hull of all used ones, seen as points of
+/// the plane across their mean direction (gnomonic projection); true for those 90 degrees or more off that mean.
+std::vector<bool> on_hull(const Lights& lights);
+
+}  // namespace darkbox

@@ -1,0 +1,144 @@
+#include "processing/pipeline/held_out.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "tests/support/textured_sphere.h"
+#include "tests/support/throws.h"
+
+namespace darkbox {
+namespace {
+
+constexpr std::size_t all = 0, lit = 1, shadowed = 2, highlight = 3;
+
+/// A sphere of which only what every light reaches is looked at: least squares is exact there. Seven lights on a ring
+/// and one on its axis.
+test::TexturedSphere fully_lit_sphere() {
+    test::TexturedSphere scene = test::textured_sphere(64, 8);
+    Light& axis = scene.lights.back();
+    axis.direction = {0.02, 0.01, 1};
+    axis.direction.normalize();
+    scene.stack.images.back() = test::lambert_photograph(scene.normals, scene.albedo, axis);
+    for (int y = 0; y < 64; ++y)
+        for (int x = 0; x < 64; ++x)
+            if (scene.normals.normal(y, x)[2] < 0.7F) scene.stack.mask(y, x) = 0;
+    return scene;
+}
+
+std::vector<HeldOutLight> held_out(const test::TexturedSphere& scene) {
+    return leave_one_light_out(scene.stack, scene.lights, photometric_stereo(scene.stack, scene.lights),
+                               {lambert_predictor()});
+}
+
+TEST(HeldOut, LambertPredictsALambertSphereExactly) {
+    const auto lights = held_out(fully_lit_sphere());
+    ASSERT_EQ(lights.size(), 8u);
+    for (const HeldOutLight& light : lights) {
+        ASSERT_TRUE(light.errors.at(0)[all] && light.errors[0][lit]) << light.file;
+        EXPECT_LT(light.errors[0][all]->rmse_relative, 1e-5) << light.file;
+        EXPECT_GT(light.errors[0][all]->psnr_db, 100) << light.file;
+        EXPECT_FALSE(light.errors[0][shadowed]);
+        EXPECT_FALSE(light.errors[0][highlight]);
+        EXPECT_LT(light.normal_change_deg, 1e-3);
+    }
+}
+
+TEST(HeldOut, TheErrorIsRelativeToThePhotographsMean) {
+    test::TexturedSphere scene = fully_lit_sphere();
+    scene.stack.images[2] *= 1.1;  // every sample a tenth too bright
+    const auto lights = held_out(scene);
+    double squares = 0, sum = 0;
+    int samples = 0;
+    for (int y = 0; y < 64; ++y)
+        for (int x = 0; x < 64; ++x)
+            for (int c = 0; c < 3 && scene.stack.mask(y, x) != 0; ++c, ++samples) {
+                const double observed = scene.stack.images[2](y, x)[c];
+                squares += std::pow(observed - observed / 1.1, 2);
+                sum += observed;
+            }
+    const double rms = std::sqrt(squares / samples);
+    EXPECT_NEAR(lights[2].errors[0][all]->rmse_relative, rms / (sum / samples), 1e-5);
+    EXPECT_NEAR(lights[2].errors[0][all]->psnr_db, -20 * std::log10(rms), 1e-3);
+    EXPECT_GT(lights[2].normal_change_deg, 0.1);
+}
+
+TEST(HeldOut, NothingOfTheHeldOutPhotographIsLearnt) {
+    test::TexturedSphere scene = fully_lit_sphere();
+    std::vector<cv::Mat3f> normals;
+    const Predictor spy{"spy", [&normals](const HeldOutTraining& training, const Light& light) {
+                            if (light.file == "ring-3.png") normals.push_back(training.solved.normals.normal.clone());
+                            return training.stack.images.front();
+                        }};
+    const PhotometricStereoResult reference = photometric_stereo(scene.stack, scene.lights);
+    leave_one_light_out(scene.stack, scene.lights, reference, {spy});
+    scene.stack.images[3] = cv::Vec3f(0.9F, 0.1F, 0.4F);
+    leave_one_light_out(scene.stack, scene.lights, reference, {spy});
+    ASSERT_EQ(normals.size(), 2u);
+    EXPECT_EQ(std::memcmp(normals[0].data, normals[1].data, normals[0].total() * sizeof(cv::Vec3f)), 0);
+}
+
+TEST(HeldOut, PredictorsStandBesideEachOther) {
+    const test::TexturedSphere scene = fully_lit_sphere();
+    const Predictor black{"black", [](const HeldOutTraining& training, const Light&) {
+                              return cv::Mat3f(training.stack.size(), cv::Vec3f::all(0));
+                          }};
+    const auto lights = leave_one_light_out(scene.stack, scene.lights, photometric_stereo(scene.stack, scene.lights),
+                                            {lambert_predictor(), black});
+    ASSERT_EQ(lights[0].errors.size(), 2u);
+    EXPECT_GT(lights[0].errors[1][all]->rmse_relative, 1.0);  // a black picture misses all of the mean and more
+}
+
+TEST(HeldOut, ShadowsHighlightsAndClippingAreToldApart) {
+    test::TexturedSphere scene = fully_lit_sphere();
+    const PhotometricStereoResult reference = photometric_stereo(scene.stack, scene.lights);
+    const cv::Vec3f white(1, 1, 1);
+    scene.stack.images[0](30, 30) = cv::Vec3f(0, 0, 0);  // a cast shadow
+    scene.stack.images[0](31, 31) = white;               // a highlight below full scale would do as well
+    scene.stack.clipped[0](32, 32) = 255;
+    const auto light = leave_one_light_out(scene.stack, scene.lights, reference, {lambert_predictor()}).front();
+    EXPECT_EQ(light.errors[0][shadowed]->pixels, 1u);
+    EXPECT_EQ(light.errors[0][highlight]->pixels, 2u);
+    EXPECT_EQ(light.errors[0][lit]->pixels + 3, light.errors[0][all]->pixels);
+}
+
+TEST(HeldOut, ABrighterPredictionIsNoErrorWhereThePhotographIsClipped) {
+    test::TexturedSphere scene = fully_lit_sphere();
+    scene.stack.clipped[0] = scene.stack.mask.clone();
+    scene.stack.images[0] *= 0.5;  // as if the sensor had ended there
+    const auto light = held_out(scene).front();
+    EXPECT_LT(light.errors[0][all]->rmse_relative, 1e-5);
+}
+
+TEST(HeldOut, TheHullIsMadeOfTheOutermostLights) {
+    const auto lights = held_out(fully_lit_sphere());
+    for (std::size_t i = 0; i < 7; ++i) EXPECT_TRUE(lights[i].hull) << i;
+    EXPECT_FALSE(lights[7].hull);
+    const auto interior = mean_errors(lights, 0, LightGroup::interior);
+    EXPECT_EQ(interior[all]->pixels, lights[7].errors[0][all]->pixels);
+    EXPECT_EQ(mean_errors(lights, 0, LightGroup::every)[all]->pixels,
+              mean_errors(lights, 0, LightGroup::hull)[all]->pixels + interior[all]->pixels);
+}
+
+TEST(HeldOut, ALightThatTheOthersCannotDoWithoutHasNoErrors) {
+    test::TexturedSphere scene = fully_lit_sphere();
+    for (std::size_t i = 0; i < 8; ++i) scene.lights[i].used = i < 4;
+    scene.lights[0].direction = Eigen::Vector3d(-0.5, 0, 1).normalized();
+    scene.lights[1].direction = Eigen::Vector3d(0, 0, 1);
+    scene.lights[2].direction = Eigen::Vector3d(0.5, 0, 1).normalized();
+    scene.lights[3].direction = Eigen::Vector3d(0, 0.5, 1).normalized();
+    const auto lights = held_out(scene);
+    ASSERT_EQ(lights.size(), 4u);
+    EXPECT_FALSE(lights[0].errors.empty());
+    EXPECT_TRUE(lights[3].errors.empty());
+}
+
+TEST(HeldOut, ThreeLightsAreTooFew) {
+    test::TexturedSphere scene = fully_lit_sphere();
+    for (std::size_t i = 3; i < 8; ++i) scene.lights[i].used = false;
+    EXPECT_NE(test::input_error_of([&] { held_out(scene); }), "");
+}
+
+}  // namespace
+}  // namespace darkbox

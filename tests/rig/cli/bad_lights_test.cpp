@@ -1,0 +1,108 @@
+// Light files that contradict themselves or the photographs.
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "tests/rig/cli/bad_input.h"
+
+namespace darkbox::test {
+namespace {
+
+using testing::HasSubstr;
+
+class BadLights : public BadInput {
+protected:
+    /// The import of four good photographs p0.png...p3.png that lie beside this .lp file.
+    ProgramResult import_with_lp(const std::string& lp) {
+        const std::string photos = photographs("photos", good_lights);
+        std::ofstream(path("photos/rti.lp")) << lp;
+        return darkbox_program({"import", photos, "--transfer", "linear", "--out", path("s").string()});
+    }
+
+    void expect_refusal(const std::string& lp, const std::string& names) {
+        const ProgramResult r = import_with_lp(lp);
+        expect_one_error(r, names);
+        EXPECT_THAT(r.err, HasSubstr("rti.lp"));
+        EXPECT_FALSE(std::filesystem::exists(path("s")));
+    }
+};
+
+TEST_F(BadLights, GoodFilesAreTaken) {
+    const auto r = import_with_lp("4\np0.png .5 .3 .81\np1.png -.5 .3 .81\np2.png 0 -.6 .8\np3.png .1 .1 .99\n");
+    EXPECT_EQ(r.status, 0) << r.err;
+}
+
+TEST_F(BadLights, ACountThatIsNotThatOfTheLines) {
+    expect_refusal("5\np0.png .5 .3 .81\np1.png -.5 .3 .81\np2.png 0 -.6 .8\np3.png .1 .1 .99\n",
+                   "it announces 5 lights, but 4 follow");
+}
+
+TEST_F(BadLights, TwoDirectionsForOnePhotograph) {
+    expect_refusal("4\np0.png .5 .3 .81\np1.png -.5 .3 .81\np0.png 0 -.6 .8\np3.png .1 .1 .99\n", "p0.png");
+}
+
+TEST_F(BadLights, TwoDirectionsForOnePhotographInAFileGivenByHand) {
+    const std::string photos = photographs("photos", good_lights);
+    std::ofstream(path("other.lp"))
+        << "5\np0.png .5 .3 .81\np1.png -.5 .3 .81\np0.png 0 -.6 .8\np2.png 0 0 1\np3.png .1 .1 .99\n";
+    expect_one_error(darkbox_program({"import", photos, "--lights", path("other.lp").string(), "--transfer", "linear",
+                                      "--out", path("s").string()}),
+                     "p0.png");
+}
+
+TEST_F(BadLights, APhotographWithoutALight) {
+    const std::string photos = photographs("photos", good_lights);
+    std::ofstream(path("other.lp")) << "3\np0.png .5 .3 .81\np1.png -.5 .3 .81\np2.png 0 -.6 .8\n";
+    expect_one_error(
+        darkbox_program({"import", photos, "--lights", path("other.lp").string(), "--out", path("s").string()}),
+        "p3.png");
+}
+
+TEST_F(BadLights, AMissingPhotograph) {
+    expect_refusal("4\np0.png .5 .3 .81\np1.png -.5 .3 .81\np2.png 0 -.6 .8\ngone.png .1 .1 .99\n", "gone.png");
+}
+
+TEST_F(BadLights, AZeroVector) {
+    expect_refusal("4\np0.png .5 .3 .81\np1.png 0 0 0\np2.png 0 -.6 .8\np3.png .1 .1 .99\n", "line 3");
+}
+
+TEST_F(BadLights, NotANumber) {
+    expect_refusal("4\np0.png .5 .3 .81\np1.png nan 0 1\np2.png 0 -.6 .8\np3.png .1 .1 .99\n", "line 3");
+    expect_refusal("4\np0.png .5 .3 .81\np1.png 0 inf 1\np2.png 0 -.6 .8\np3.png .1 .1 .99\n", "line 3");
+    expect_refusal("4\np0.png .5 .3 .81\np1.png east 0 1\np2.png 0 -.6 .8\np3.png .1 .1 .99\n", "line 3");
+}
+
+TEST_F(BadLights, ANumberTooLargeForAnyComputer) {
+    expect_refusal("4\np0.png .5 .3 .81\np1.png 1e999 0 1\np2.png 0 -.6 .8\np3.png .1 .1 .99\n", "line 3");
+    expect_refusal("4\np0.png .5 .3 .81\np1.png 1e200 1e200 1e200\np2.png 0 -.6 .8\np3.png .1 .1 .99\n", "line 3");
+}
+
+TEST_F(BadLights, ALightBehindTheObject) {
+    const auto r = import_with_lp("4\np0.png .5 .3 .81\np1.png -.5 .3 .81\np2.png 0 -.6 -.8\np3.png .1 .1 .99\n");
+    EXPECT_EQ(r.status, 0) << r.err;
+    const auto calibrated = darkbox_program({"calibrate", path("s").string()});
+    EXPECT_EQ(calibrated.status, 0) << calibrated.err;
+    EXPECT_THAT(calibrated.err, HasSubstr("p2.png"));
+}
+
+TEST_F(BadLights, ThousandLightsGiveOneAnswer) {
+    std::vector<Direction> lights;
+    for (int i = 0; i < 1000; ++i) {
+        const double turn = 0.61803 * 2 * 3.14159265 * i;
+        const double away = 0.7 * std::sqrt((i + 0.5) / 1000);
+        lights.push_back({away * std::cos(turn), away * std::sin(turn), std::sqrt(1 - away * away)});
+    }
+    ASSERT_EQ(import(photographs("photos", lights), lights).status, 0);
+    const auto r = darkbox_program({"process", path("s").string(), "--json"});
+    ASSERT_EQ(r.status, 0) << r.err;
+    EXPECT_EQ(nlohmann::json::parse(r.out)["normals"]["images"], 1000);
+    const auto lp = darkbox_program({"export", path("s").string(), "--format", "lp", "--out", path("lp").string()});
+    EXPECT_EQ(lp.status, 0) << lp.err;
+}
+
+}  // namespace
+}  // namespace darkbox::test
