@@ -180,13 +180,16 @@ std::vector<RgbImage> Renderer::render(std::span<const LampId> lamps) const {
 SceneTruth Renderer::truth() const {
     const View& view = scene_.view;
     SceneTruth truth{RgbImage(view.width, view.height), RgbImage(view.width, view.height),
-                     std::vector<char>(static_cast<std::size_t>(view.width) * view.height, 0)};
+                     std::vector<char>(static_cast<std::size_t>(view.width) * view.height, 0),
+                     std::vector<float>(static_cast<std::size_t>(view.width) * view.height, 0.0F)};
     for_each_row(view.height, [&](int row) {
         for (int column = 0; column < view.width; ++column) {
             const Sample centre = sample(camera_ray(view, column, row));
             if (!centre.shows_object) continue;
             const Vec3& n = centre.seen.normal;
-            truth.mask[static_cast<std::size_t>(row) * view.width + column] = 1;
+            const std::size_t pixel = static_cast<std::size_t>(row) * view.width + column;
+            truth.mask[pixel] = 1;
+            truth.heights[pixel] = static_cast<float>(centre.seen.position.z);
             truth.normals.set(column, row, {n.x, n.y, n.z});
             Rgb sum;
             int count = 0;

@@ -14,11 +14,12 @@ namespace darkbox::sim {
 /// Side of the regular grid of rays in every pixel.
 constexpr int rays_per_pixel_side = 4;
 
-/// What is true of the object at each pixel. Background: normal and albedo 0.
+/// What is true of the object at each pixel. Background: normal, albedo and height 0.
 struct SceneTruth {
-    RgbImage normals;        ///< viewer frame, relief included, at the pixel's centre
-    RgbImage albedo;         ///< mean over the part of the pixel that the object covers
-    std::vector<char> mask;  ///< 1 where the pixel's centre shows the object
+    RgbImage normals;            ///< viewer frame, relief included, at the pixel's centre
+    RgbImage albedo;             ///< mean over the part of the pixel that the object covers
+    std::vector<char> mask;      ///< 1 where the pixel's centre shows the object
+    std::vector<float> heights;  ///< z of what the pixel's centre shows, viewer frame, mm
 };
 
 /// Traces rays from the camera: direct light with shadows, and one reflection on the mirror ball. Interreflection on

@@ -1,5 +1,6 @@
 #include "sim/truth.h"
 
+#include <ImathBox.h>
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
@@ -7,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <fstream>
+#include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
@@ -23,21 +25,22 @@ namespace fs = std::filesystem;
                       "check the folder's permissions and the free space");
 }
 
-void write_exr(const RgbImage& image, const fs::path& file) {
+/// Float samples, interleaved, under the channels' names.
+void write_exr(const std::vector<float>& samples, int width, std::initializer_list<const char*> channels,
+               const fs::path& file) {
     try {
-        Imf::Header header(image.width, image.height);
+        const std::size_t pixel = channels.size() * sizeof(float), row = pixel * static_cast<std::size_t>(width);
+        Imf::Header header(width, static_cast<int>(samples.size() * sizeof(float) / row));
         Imf::FrameBuffer buffer;
-        constexpr std::size_t pixel = 3 * sizeof(float);
-        auto* base = reinterpret_cast<char*>(const_cast<float*>(image.samples.data()));  // OpenEXR only reads it
-        for (int i = 0; i < 3; ++i) {
-            constexpr const char* names[] = {"R", "G", "B"};
-            header.channels().insert(names[i], Imf::Channel(Imf::FLOAT));
-            buffer.insert(names[i], Imf::Slice(Imf::FLOAT, base + i * sizeof(float), pixel,
-                                               pixel * static_cast<std::size_t>(image.width)));
+        auto* base = reinterpret_cast<char*>(const_cast<float*>(samples.data()));  // OpenEXR only reads it
+        for (const char* name : channels) {
+            header.channels().insert(name, Imf::Channel(Imf::FLOAT));
+            buffer.insert(name, Imf::Slice(Imf::FLOAT, base, pixel, row));
+            base += sizeof(float);
         }
         Imf::OutputFile output(file.c_str(), header);
         output.setFrameBuffer(buffer);
-        output.writePixels(image.height);
+        output.writePixels(header.dataWindow().max.y + 1);
     } catch (const std::exception& e) {
         throw_unwritable(file, e.what());
     }
@@ -94,8 +97,9 @@ void write_truth(const Scene& scene, const std::vector<ExposureTruth>& exposures
     fs::create_directories(folder, failed);
     if (failed) throw_unwritable(folder, failed.message());
     const SceneTruth truth = render_truth(scene);
-    write_exr(truth.normals, folder / "normals.exr");
-    write_exr(truth.albedo, folder / "albedo.exr");
+    write_exr(truth.normals.samples, truth.normals.width, {"R", "G", "B"}, folder / "normals.exr");
+    write_exr(truth.albedo.samples, truth.albedo.width, {"R", "G", "B"}, folder / "albedo.exr");
+    write_exr(truth.heights, truth.normals.width, {"Y"}, folder / "height.exr");
     write_mask(truth, folder / "mask.png");
     write_text(lights_lp(scene), folder / "lights.lp");
     write_text(lamps_json(scene, exposures), folder / "lamps.json");

@@ -7,6 +7,7 @@
 #include <ImfInputFile.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -14,6 +15,7 @@
 
 #include "acquisition/device/device_error.h"
 #include "sim/renderer.h"
+#include "sim/scenes.h"
 #include "sim/sim_rig.h"
 #include "tests/sim/sim_test_support.h"
 #include "tests/support/test_data.h"
@@ -42,6 +44,29 @@ RgbImage read_exr(const std::filesystem::path& file) {
     return image;
 }
 
+std::vector<float> read_heights(const std::filesystem::path& file) {
+    Imf::InputFile input(file.c_str());
+    const auto window = input.header().dataWindow();
+    std::vector<float> values(static_cast<std::size_t>(window.max.x + 1) * (window.max.y + 1));
+    Imf::FrameBuffer buffer;
+    buffer.insert("Y", Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()), sizeof(float),
+                                  sizeof(float) * static_cast<std::size_t>(window.max.x + 1)));
+    input.setFrameBuffer(buffer);
+    input.readPixels(0, window.max.y);
+    return values;
+}
+
+TEST(Truth, HeightIsThatOfASphere) {
+    Scene scene;
+    scene.object.push_back({Sphere{{0, 0, 10}, 40}, {}});
+    scene.object.back().material.texture = scene_by_name({.scene = "sphere"}, {}).object.front().material.texture;
+    scene.view = {Projection::orthographic, 41, 41, 2.0, 800};
+    const SceneTruth truth = render_truth(scene);
+    EXPECT_NEAR(truth.heights[20 * 41 + 20], 50, 1e-4);
+    EXPECT_NEAR(truth.heights[20 * 41 + 32], 10 + std::sqrt(40.0 * 40 - 24 * 24), 1e-4);
+    EXPECT_EQ(truth.heights[0], 0) << "the backdrop is not the object";
+}
+
 TEST(Truth, FilesHoldWhatWasTrue) {
     const test::TemporaryFolder folder;
     SimRig rig = SimRig::make(small_rig("torus-moss"));
@@ -57,6 +82,7 @@ TEST(Truth, FilesHoldWhatWasTrue) {
     const SceneTruth truth = render_truth(rig.scene());
     EXPECT_EQ(read_exr(path / "normals.exr").samples, truth.normals.samples);
     EXPECT_EQ(read_exr(path / "albedo.exr").samples, truth.albedo.samples);
+    EXPECT_EQ(read_heights(path / "height.exr"), truth.heights);
     const cv::Mat1b mask = cv::imread((path / "mask.png").string(), cv::IMREAD_UNCHANGED);
     ASSERT_EQ(mask.cols, 64);
     for (int v = 0; v < 48; ++v)
