@@ -51,11 +51,6 @@ Imf::Slice slice_of(cv::Mat1f& values, const Imath::Box2i& window) {
     return Imf::Slice::Make(Imf::FLOAT, values.ptr(), window.min, values.cols, values.rows, sizeof(float), row);
 }
 
-void limit_the_library() {
-    static std::once_flag once;
-    std::call_once(once, [] { Imf::Header::setMaxImageSize(longest_side, longest_side); });
-}
-
 std::vector<ExrChannel> read_channels(Imf::InputFile& input, const std::string& file, std::uint64_t limit) {
     const Imath::Box2i window = input.header().dataWindow();
     const auto width = static_cast<std::uint64_t>(window.max.x - window.min.x + 1);
@@ -89,8 +84,13 @@ void require_alike(const std::vector<ExrChannel>& channels, const fs::path& path
 
 }  // namespace
 
+void limit_exr_library() {
+    static std::once_flag once;
+    std::call_once(once, [] { Imf::Header::setMaxImageSize(longest_side, longest_side); });
+}
+
 std::vector<ExrChannel> decode_exr(Bytes bytes, const std::string& file, std::uint64_t limit) {
-    limit_the_library();
+    limit_exr_library();
     try {
         MemoryStream stream(bytes, file);
         Imf::InputFile input(stream, 1);

@@ -9,6 +9,9 @@
 
 namespace darkbox {
 
+/// Keeps the library from reserving memory for sizes that no picture has. Before anything is read.
+void limit_exr_library();
+
 /// Every channel of the first part, as float. Throws InputError that names the file.
 std::vector<ExrChannel> decode_exr(Bytes bytes, const std::string& file, std::uint64_t most_pixels);
 

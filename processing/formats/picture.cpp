@@ -36,12 +36,6 @@ std::optional<PictureFormat> format_by_content(Bytes bytes) {
     return std::nullopt;
 }
 
-PictureFormat require_format(Bytes bytes, const std::string& file) {
-    if (bytes.empty()) throw bad_picture(file, "is empty");
-    if (const auto format = format_by_content(bytes)) return *format;
-    throw InputError(fmt::format("{} is not a picture that darkbox reads", file), "give PNG, TIFF, JPEG or EXR");
-}
-
 PictureHeader inspect(Bytes bytes, PictureFormat format, const std::string& file) {
     switch (format) {
         case PictureFormat::png:
@@ -51,15 +45,6 @@ PictureHeader inspect(Bytes bytes, PictureFormat format, const std::string& file
         default:
             return inspect_tiff(bytes, file);
     }
-}
-
-void require_finite(const cv::Mat3f& samples, const std::string& file) {
-    for (int y = 0; y < samples.rows; ++y)
-        for (int x = 0; x < samples.cols; ++x) {
-            const cv::Vec3f& p = samples(y, x);
-            if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2]))
-                throw bad_picture(file, fmt::format("has a sample that is not a finite number at ({}, {})", x, y));
-        }
 }
 
 cv::Mat decode_with_opencv(Bytes bytes, const std::string& file) {
@@ -106,6 +91,22 @@ Picture decode_integer_picture(Bytes bytes, PictureFormat format, const std::str
 
 }  // namespace
 
+PictureFormat require_picture_format(Bytes bytes, const std::string& file) {
+    if (bytes.empty()) throw bad_picture(file, "is empty");
+    if (const auto format = format_by_content(bytes)) return *format;
+    throw InputError(fmt::format("{} is not a picture that darkbox reads", file), "give PNG, TIFF, JPEG or EXR");
+}
+
+void require_finite(const cv::Mat3f& samples, int first_row, const std::string& file) {
+    for (int y = 0; y < samples.rows; ++y)
+        for (int x = 0; x < samples.cols; ++x) {
+            const cv::Vec3f& p = samples(y, x);
+            if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2]))
+                throw bad_picture(
+                    file, fmt::format("has a sample that is not a finite number at ({}, {})", x, first_row + y));
+        }
+}
+
 void require_sane_size(std::uint64_t width, std::uint64_t height, const std::string& file) {
     if (width == 0 || height == 0) throw bad_picture(file, "has no pixels");
     if (width > most_pixels || height > most_pixels || width * height > most_pixels)
@@ -142,11 +143,11 @@ cv::Mat1b clipped_samples(const Picture& picture) {
 }
 
 Picture decode_picture(Bytes bytes, const std::string& file) {
-    const PictureFormat format = require_format(bytes, file);
+    const PictureFormat format = require_picture_format(bytes, file);
     Picture picture =
         format == PictureFormat::exr ? decode_exr_picture(bytes, file) : decode_integer_picture(bytes, format, file);
     picture.format = format;
-    if (picture.is_float) require_finite(picture.samples, file);
+    if (picture.is_float) require_finite(picture.samples, 0, file);
     return picture;
 }
 

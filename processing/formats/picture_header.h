@@ -28,4 +28,10 @@ PictureHeader inspect_tiff(Bytes bytes, const std::string& file);  ///< first di
 /// Throws InputError for no pixels, or beyond 512 megapixels.
 void require_sane_size(std::uint64_t width, std::uint64_t height, const std::string& file);
 
+/// By its first bytes. Throws InputError when it is empty or none of the formats.
+PictureFormat require_picture_format(Bytes bytes, const std::string& file);
+
+/// Throws InputError that names the first sample that is not finite; `samples` begin at row `first_row`.
+void require_finite(const cv::Mat3f& samples, int first_row, const std::string& file);
+
 }  // namespace darkbox

@@ -1,8 +1,15 @@
 #include "processing/normals/least_squares.h"
 
+#include <sys/mman.h>
+
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cstdint>
+#include <initializer_list>
+#include <numeric>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "processing/normals/least_squares_block.h"
 
@@ -19,50 +26,34 @@ struct Place {
     int column = 0;
 };
 
-bool on_object(const PhotoBand& band, Place place, std::size_t i) {
-    return band.mask.empty() || band.mask(place.row, place.column + static_cast<int>(i)) != 0;
-}
-
-bool empty_of_object(const PhotoBand& band, Place place, int count) {
-    if (band.mask.empty()) return false;
+/// Returns whether anything of it lies on the object.
+bool load_mask(const PhotoBand& band, Place place, LeastSquaresBlock& block) {
+    if (band.mask.empty()) {
+        block.mask.fill(1);
+        return true;
+    }
     const uchar* mask = band.mask[place.row] + place.column;
-    return std::all_of(mask, mask + count, [](uchar m) { return m == 0; });
+    std::copy_n(mask, block.count, block.mask.begin());
+    return std::any_of(mask, mask + block.count, [](uchar m) { return m != 0; });
 }
 
-void load(const PhotoBand& band, const LightSet& set, Place place, LeastSquaresBlock& block) {
-    block.clipped.at.fill(0.0F);
+/// Returns the lights that have a clipped sample in the block.
+std::vector<std::size_t> load_samples(const PhotoBand& band, const LightSet& set, Place place,
+                                      LeastSquaresBlock& block) {
+    std::vector<std::size_t> clipped;
     for (std::size_t k = 0; k < set.lights.size(); ++k) {
         const SolverLight& light = set.lights[k];
-        load_photo(band.photos[light.image], place.row, place.column, light.gain, k, block);
+        if (load_photo(band.photos[light.image], place.row, place.column, light.gain, k, block)) clipped.push_back(k);
     }
     block.samples_used.at.fill(static_cast<float>(set.lights.size()));
+    return clipped;
 }
 
-/// A sample that is not finite leaves its trace in g; it is looked for before clipped samples are dropped, so that such
-/// a pixel is never half used. Returns the number of such pixels on the object.
-std::size_t find_usable(const PhotoBand& band, Place place, LeastSquaresBlock& block) {
-    std::size_t not_finite = 0;
-    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); ++i) {
-        const float trace = block.g[0].at[i] * 0.0F + block.g[1].at[i] * 0.0F + block.g[2].at[i] * 0.0F;
-        const bool finite = trace == 0.0F, inside = on_object(band, place, i);
-        block.usable.at[i] = finite && inside ? 1.0F : 0.0F;
-        not_finite += inside && !finite ? 1 : 0;
-    }
-    return not_finite;
-}
-
-/// One pixel's samples that are not clipped.
-class UnclippedPixel {
+/// One pixel's samples of some lights.
+class PartialPixel {
 public:
-    UnclippedPixel(const PhotoBand& band, const LightSet& set, Place place, const LeastSquaresBlock& block,
-                   std::size_t i)
-        : set_(set), block_(block), i_(i) {
-        for (std::size_t k = 0; k < set.lights.size(); ++k)
-            if (!clipped_at(band.photos[set.lights[k].image], place.row, place.column + static_cast<int>(i)))
-                kept_.push_back(k);
-    }
-
-    std::size_t samples() const { return kept_.size(); }
+    PartialPixel(const LightSet& set, const LeastSquaresBlock& block, std::size_t i, std::vector<std::size_t> lights)
+        : set_(set), block_(block), i_(i), kept_(std::move(lights)) {}
 
     /// g of these samples alone; no value where they do not determine it well.
     std::optional<Eigen::Vector3f> solve() const {
@@ -112,19 +103,30 @@ private:
     std::vector<std::size_t> kept_;
 };
 
-void leave_out_clipped(const PhotoBand& band, const LightSet& set, Place place, LeastSquaresBlock& block) {
-    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); ++i) {
-        if (block.clipped.at[i] == 0.0F || block.usable.at[i] == 0.0F) continue;
-        const UnclippedPixel pixel(band, set, place, block, i);
-        if (const auto g = pixel.solve()) pixel.put(*g, block);
-    }
+/// The lights of one pixel that are not clipped, where `suspects` are those that may be.
+std::vector<std::size_t> unclipped_lights(const PhotoBand& band, const LightSet& set, Place pixel,
+                                          const std::vector<std::size_t>& suspects) {
+    std::vector<std::size_t> kept(set.lights.size());
+    std::iota(kept.begin(), kept.end(), std::size_t{0});
+    const auto clipped = [&](std::size_t k) {
+        return std::binary_search(suspects.begin(), suspects.end(), k) &&
+               clipped_at(band.photos[set.lights[k].image], pixel.row, pixel.column);
+    };
+    std::erase_if(kept, clipped);
+    return kept;
 }
 
-void write_flags(const LeastSquaresBlock& block, uchar* valid, ushort* lights_used) {
+void leave_out_clipped(const PhotoBand& band, const LightSet& set, Place place,
+                       const std::vector<std::size_t>& suspects, LeastSquaresBlock& block) {
     for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); ++i) {
-        const bool is_valid = block.usable.at[i] > 0.0F;
-        valid[i] = is_valid ? 255 : 0;
-        lights_used[i] = is_valid ? static_cast<ushort>(block.samples_used.at[i]) : ushort{0};
+        if (block.usable.at[i] == 0.0F) continue;
+        const Place here{place.row, place.column + static_cast<int>(i)};
+        const bool clipped = std::any_of(suspects.begin(), suspects.end(), [&](std::size_t k) {
+            return clipped_at(band.photos[set.lights[k].image], here.row, here.column);
+        });
+        if (!clipped) continue;
+        const PartialPixel pixel(set, block, i, unclipped_lights(band, set, here, suspects));
+        if (const auto g = pixel.solve()) pixel.put(*g, block);
     }
 }
 
@@ -137,9 +139,21 @@ void write_nothing(Place place, int row, int count, SolvedMaps& maps) {
     std::fill_n(maps.lights_used[row] + c, count, ushort{0});
 }
 
+/// The first writing of a map costs a page fault for every page: half of the solver's time with small ones. A wish that
+/// the system may not grant.
+void prefer_large_pages(const cv::Mat& map) {
+    constexpr std::uintptr_t page = 4096;
+    const auto first = (reinterpret_cast<std::uintptr_t>(map.datastart) + page - 1) / page * page;
+    const auto last = reinterpret_cast<std::uintptr_t>(map.dataend) / page * page;
+    if (first < last) ::madvise(reinterpret_cast<void*>(first), last - first, MADV_HUGEPAGE);
+}
+
 }  // namespace
 
-SolvedMaps::SolvedMaps(cv::Size size) : normal(size), albedo(size), valid(size), residual(size), lights_used(size) {}
+SolvedMaps::SolvedMaps(cv::Size size) : normal(size), albedo(size), valid(size), residual(size), lights_used(size) {
+    for (const cv::Mat* map : std::initializer_list<const cv::Mat*>{&normal, &albedo, &valid, &residual, &lights_used})
+        prefer_large_pages(*map);
+}
 
 std::size_t SolvedMaps::bytes_per_pixel() {
     return 2 * sizeof(cv::Vec3f) + sizeof(uchar) + sizeof(float) + sizeof(ushort);
@@ -153,18 +167,17 @@ std::size_t solve_row_least_squares(const PhotoBand& band, const LightSet& set, 
     for (Place place{row, 0}; place.column < band.cols(); place.column += block_pixels) {
         const int c = place.column;
         block.count = std::min(block_pixels, band.cols() - c);
-        if (empty_of_object(band, place, block.count)) {
+        if (!load_mask(band, place, block)) {
             write_nothing(place, map_row, block.count, maps);
             continue;
         }
-        load(band, set, place, block);
-        project(set, block);
-        not_finite += find_usable(band, place, block);
+        const std::vector<std::size_t> clipped = load_samples(band, set, place, block);
+        not_finite += project(set, block);
         accumulate_albedo(set, block);
-        leave_out_clipped(band, set, place, block);
+        if (!clipped.empty()) leave_out_clipped(band, set, place, clipped, block);
         finish(min_albedo, block,
-               {maps.normal[map_row][c].val, maps.albedo[map_row][c].val, maps.residual[map_row] + c});
-        write_flags(block, maps.valid[map_row] + c, maps.lights_used[map_row] + c);
+               {maps.normal[map_row][c].val, maps.albedo[map_row][c].val, maps.residual[map_row] + c,
+                maps.valid[map_row] + c, maps.lights_used[map_row] + c});
     }
     return not_finite;
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
+#include <type_traits>
 
 // Highway compiles this file once for each kind of processor.
 #undef HWY_TARGET_INCLUDE
@@ -30,16 +32,16 @@ inline float* at(Plane& plane, std::size_t i) { return plane.at.data() + i; }
 inline Vector load(const Plane& plane, std::size_t i) { return hn::Load(Floats(), plane.at.data() + i); }
 inline void store(Vector values, Plane& plane, std::size_t i) { hn::Store(values, Floats(), at(plane, i)); }
 
-/// What load_photo() does with linear samples; `dark` is empty where a constant is subtracted.
+/// Linear samples; `dark` is null where a constant is subtracted. Returns whether any sample is clipped.
 template <class Sample>
-void load_linear(const PhotoRows& rows, const Sample* samples, const float* dark, const std::array<float, 3>& gain,
-                 Plane* rgb, LeastSquaresBlock& block) {
+bool load_linear(const PhotoRows& rows, const Sample* samples, const float* dark, const std::array<float, 3>& gain,
+                 Plane* rgb, std::size_t count) {
     const Floats d;
     const hn::Rebind<Sample, Floats> narrow;
-    const auto count = static_cast<std::size_t>(block.count);
-    const Vector scale = hn::Set(d, rows.scale), limit = hn::Set(d, rows.limit), one = hn::Set(d, 1.0F);
+    const Vector scale = hn::Set(d, rows.scale);
     const Vector gains[3] = {hn::Set(d, gain[0]), hn::Set(d, gain[1]), hn::Set(d, gain[2])};
     Vector black[3] = {hn::Set(d, rows.black), hn::Set(d, rows.black), hn::Set(d, rows.black)};
+    Vector highest = hn::Set(d, -std::numeric_limits<float>::infinity());
     std::size_t i = 0;
     for (; i + lanes() <= count; i += lanes()) {
         hn::Vec<decltype(narrow)> r, g, b;
@@ -47,54 +49,52 @@ void load_linear(const PhotoRows& rows, const Sample* samples, const float* dark
         if (dark) hn::LoadInterleaved3(d, dark + 3 * i, black[0], black[1], black[2]);
         const Vector wide[3] = {widened(r), widened(g), widened(b)};
         for (int c = 0; c < 3; ++c) store(hn::Mul(hn::Mul(hn::Sub(wide[c], black[c]), scale), gains[c]), rgb[c], i);
-        const auto clipped = hn::Ge(hn::Max(hn::Max(wide[0], wide[1]), wide[2]), limit);
-        store(hn::IfThenElse(clipped, one, load(block.clipped, i)), block.clipped, i);
+        highest = hn::Max(highest, hn::Max(hn::Max(wide[0], wide[1]), wide[2]));
     }
+    float most = hn::GetLane(hn::MaxOfLanes(d, highest));
     for (; i < count; ++i) {
         const Sample* s = samples + 3 * i;
         for (std::size_t c = 0; c < 3; ++c) {
             const float level = dark ? dark[3 * i + c] : rows.black;
             rgb[c].at[i] = (static_cast<float>(s[c]) - level) * rows.scale * gain[c];
         }
-        if (static_cast<float>(std::max({s[0], s[1], s[2]})) >= rows.limit) block.clipped.at[i] = 1.0F;
+        most = std::max(most, static_cast<float>(std::max({s[0], s[1], s[2]})));
     }
+    return most >= rows.limit;
 }
 
 template <class Sample>
-void load_curved(const PhotoRows& rows, const Sample* samples, const std::array<float, 3>& gain, Plane* rgb,
-                 LeastSquaresBlock& block) {
+bool load_curved(const PhotoRows& rows, const Sample* samples, const std::array<float, 3>& gain, Plane* rgb,
+                 std::size_t count) {
     const float* curve = rows.curve->data();
-    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); ++i) {
-        const Sample* s = samples + 3 * i;
-        for (std::size_t c = 0; c < 3; ++c) rgb[c].at[i] = curve[s[c]] * gain[c];
-        if (static_cast<float>(std::max({s[0], s[1], s[2]})) >= rows.limit) block.clipped.at[i] = 1.0F;
-    }
+    Sample most = 0;
+    for (std::size_t i = 0; i < count; ++i)
+        for (std::size_t c = 0; c < 3; ++c) {
+            const Sample sample = samples[3 * i + c];
+            rgb[c].at[i] = curve[sample] * gain[c];
+            most = std::max(most, sample);
+        }
+    return static_cast<float>(most) >= rows.limit;
 }
 
-template <class Sample>
-void load_samples(const PhotoRows& rows, int row, int column, const std::array<float, 3>& gain, Plane* rgb,
-                  LeastSquaresBlock& block) {
-    const auto first = std::ptrdiff_t{3} * column;
-    const Sample* samples = rows.samples.ptr<Sample>(row) + first;
-    if (rows.curve)
-        load_curved(rows, samples, gain, rgb, block);
-    else
-        load_linear(rows, samples, rows.dark.empty() ? nullptr : rows.dark.ptr<float>(row) + first, gain, rgb, block);
-}
-
-void load_photo(const PhotoRows& rows, int row, int column, const std::array<float, 3>& gain, std::size_t light,
+bool load_photo(const PhotoRows& rows, int row, int column, const std::array<float, 3>& gain, std::size_t light,
                 LeastSquaresBlock& block) {
     Plane* rgb = block.rgb(light);
+    const auto first = std::ptrdiff_t{3} * column;
+    const auto count = static_cast<std::size_t>(block.count);
+    const float* dark = rows.dark.empty() ? nullptr : rows.dark.ptr<float>(row) + first;
+    const auto load_samples = [&]<class Sample>(const Sample* samples) {
+        if constexpr (!std::is_same_v<Sample, float>)
+            if (rows.curve) return load_curved(rows, samples + first, gain, rgb, count);
+        return load_linear(rows, samples + first, dark, gain, rgb, count);
+    };
     switch (rows.samples.depth()) {
         case CV_8U:
-            return load_samples<std::uint8_t>(rows, row, column, gain, rgb, block);
+            return load_samples(rows.samples.ptr<std::uint8_t>(row));
         case CV_16U:
-            return load_samples<std::uint16_t>(rows, row, column, gain, rgb, block);
-        default: {
-            const auto first = std::ptrdiff_t{3} * column;
-            const float* dark = rows.dark.empty() ? nullptr : rows.dark.ptr<float>(row) + first;
-            load_linear(rows, rows.samples.ptr<float>(row) + first, dark, gain, rgb, block);
-        }
+            return load_samples(rows.samples.ptr<std::uint16_t>(row));
+        default:
+            return load_samples(rows.samples.ptr<float>(row));
     }
 }
 
@@ -103,8 +103,16 @@ inline Vector mean_sample(const Plane* rgb, std::size_t i) {
     return hn::Mul(sum, hn::Set(Floats(), 1.0F / 3.0F));
 }
 
-void project(const LightSet& set, LeastSquaresBlock& block) {
+/// All bits set where a byte of the mask is not 0.
+inline hn::Mask<Floats> inside(const LeastSquaresBlock& block, std::size_t i) {
+    const hn::RebindToSigned<Floats> words;
+    const auto bytes = hn::LoadU(hn::Rebind<std::uint8_t, Floats>(), block.mask.data() + i);
+    return hn::RebindMask(Floats(), hn::Gt(hn::PromoteTo(words, bytes), hn::Zero(words)));
+}
+
+std::size_t project(const LightSet& set, LeastSquaresBlock& block) {
     const Floats d;
+    std::size_t not_finite = 0;
     for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); i += lanes()) {
         Vector x = hn::Zero(d), y = hn::Zero(d), z = hn::Zero(d);
         for (std::size_t k = 0; k < set.lights.size(); ++k) {
@@ -117,7 +125,13 @@ void project(const LightSet& set, LeastSquaresBlock& block) {
         store(x, block.g[0], i);
         store(y, block.g[1], i);
         store(z, block.g[2], i);
+        // Zero times anything else than a finite number is not a number.
+        const Vector trace = hn::Mul(hn::Add(hn::Add(x, y), z), hn::Zero(d));
+        const auto finite = hn::Eq(trace, hn::Zero(d)), object = inside(block, i);
+        store(hn::IfThenElseZero(hn::And(finite, object), hn::Set(d, 1.0F)), block.usable, i);
+        not_finite += hn::CountTrue(d, hn::AndNot(finite, object));
     }
+    return not_finite;
 }
 
 void accumulate_albedo(const LightSet& set, LeastSquaresBlock& block) {
@@ -147,23 +161,25 @@ void accumulate_albedo(const LightSet& set, LeastSquaresBlock& block) {
     }
 }
 
-/// Interleaves three planes' pixels [i, i + lanes) into place; fewer at the block's end.
-inline void put(Vector a, Vector b, Vector c, std::size_t i, std::size_t count, float* out) {
-    const Floats d;
-    if (i + lanes() <= count) return hn::StoreInterleaved3(a, b, c, d, out + 3 * i);
-    HWY_ALIGN float whole[3 * hn::MaxLanes(Floats())];
-    hn::StoreInterleaved3(a, b, c, d, whole);
-    std::copy_n(whole, 3 * (count - i), out + 3 * i);
+/// Puts pixels [i, i + lanes) of one map into place; fewer at the block's end.
+template <class Value, class Whole>
+void put(std::size_t i, std::size_t count, std::size_t channels, Value* map, Whole store_whole) {
+    if (i + lanes() <= count) return store_whole(map + channels * i);
+    HWY_ALIGN Value whole[3 * block_pixels];
+    store_whole(whole);
+    std::copy_n(whole, channels * (count - i), map + channels * i);
 }
 
-void finish(float min_albedo, LeastSquaresBlock& block, const BlockResults& results) {
+void finish(float min_albedo, const LeastSquaresBlock& block, const BlockResults& results) {
     const Floats d;
-    const Vector zero = hn::Zero(d), one = hn::Set(d, 1.0F), darkest = hn::Set(d, min_albedo);
+    const hn::Rebind<std::uint8_t, Floats> bytes;
+    const hn::Rebind<std::uint16_t, Floats> words;
+    const Vector zero = hn::Zero(d), darkest = hn::Set(d, min_albedo), full = hn::Set(d, 255.0F);
     const auto count = static_cast<std::size_t>(block.count);
     for (std::size_t i = 0; i < count; i += lanes()) {
         const Vector x = load(block.g[0], i), y = load(block.g[1], i), z = load(block.g[2], i);
         const Vector length = hn::Sqrt(hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z)));
-        const Vector weight = load(block.lit_weight, i);
+        const Vector weight = load(block.lit_weight, i), used = load(block.samples_used, i);
         const Vector scale = hn::Div(length, weight);
         const Vector red = hn::Mul(load(block.colour[0], i), scale), green = hn::Mul(load(block.colour[1], i), scale),
                      blue = hn::Mul(load(block.colour[2], i), scale);
@@ -171,16 +187,21 @@ void finish(float min_albedo, LeastSquaresBlock& block, const BlockResults& resu
         const auto solved = hn::And(hn::Gt(length, zero), hn::Gt(weight, zero));
         const auto usable = hn::Gt(load(block.usable, i), zero);
         const auto valid = hn::And(hn::And(solved, usable), hn::Ge(albedo, darkest));
-        put(hn::IfThenElseZero(valid, hn::Div(x, length)), hn::IfThenElseZero(valid, hn::Div(y, length)),
-            hn::IfThenElseZero(valid, hn::Div(z, length)), i, count, results.normal);
-        put(hn::IfThenElseZero(valid, red), hn::IfThenElseZero(valid, green), hn::IfThenElseZero(valid, blue), i, count,
-            results.albedo);
-        const Vector residual =
-            hn::IfThenElseZero(valid, hn::Sqrt(hn::Div(load(block.squared, i), load(block.samples_used, i))));
-        store(residual, block.squared, i);
-        store(hn::IfThenElseZero(valid, one), block.usable, i);
+        const auto kept = [&](Vector values) { return hn::IfThenElseZero(valid, values); };
+        put(i, count, 3, results.normal, [&](float* to) {
+            hn::StoreInterleaved3(kept(hn::Div(x, length)), kept(hn::Div(y, length)), kept(hn::Div(z, length)), d, to);
+        });
+        put(i, count, 3, results.albedo,
+            [&](float* to) { hn::StoreInterleaved3(kept(red), kept(green), kept(blue), d, to); });
+        put(i, count, 1, results.residual,
+            [&](float* to) { hn::StoreU(kept(hn::Sqrt(hn::Div(load(block.squared, i), used))), d, to); });
+        put(i, count, 1, results.valid, [&](std::uint8_t* to) {
+            hn::StoreU(hn::DemoteTo(bytes, hn::ConvertTo(hn::RebindToSigned<Floats>(), kept(full))), bytes, to);
+        });
+        put(i, count, 1, results.lights_used, [&](std::uint16_t* to) {
+            hn::StoreU(hn::DemoteTo(words, hn::ConvertTo(hn::RebindToSigned<Floats>(), kept(used))), words, to);
+        });
     }
-    std::copy_n(block.squared.at.data(), count, results.residual);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -197,32 +218,47 @@ HWY_EXPORT(finish);
 
 LeastSquaresBlock::LeastSquaresBlock(std::size_t lights) : samples(std::make_unique<Plane[]>(3 * lights)) {}
 
-void load_photo(const PhotoRows& rows, int row, int column, const std::array<float, 3>& gain, std::size_t light,
-                LeastSquaresBlock& block) {
-    HWY_DYNAMIC_DISPATCH(load_photo)(rows, row, column, gain, light, block);
-    if (rows.clipped.empty()) return;
-    const uchar* clipped = rows.clipped[row] + column;
-    for (int i = 0; i < block.count; ++i)
-        if (clipped[i] != 0) block.clipped.at[static_cast<std::size_t>(i)] = 1.0F;
+/// The photographs are as many streams as there are lights, too many for the processor to foresee.
+[[maybe_unused]] static void prefetch_next(const PhotoRows& rows, int row, int column, int count) {
+    constexpr std::ptrdiff_t cache_line = 64;
+    const auto bytes = static_cast<std::ptrdiff_t>(rows.samples.elemSize()) * count;
+    const uchar* next = rows.samples.ptr(row, column) + bytes;
+    const uchar* end = std::min(next + bytes, rows.samples.dataend);
+    for (; next < end; next += cache_line) __builtin_prefetch(next, 0, 3);
 }
 
-void project(const LightSet& set, LeastSquaresBlock& block) { HWY_DYNAMIC_DISPATCH(project)(set, block); }
+bool load_photo(const PhotoRows& rows, int row, int column, const std::array<float, 3>& gain, std::size_t light,
+                LeastSquaresBlock& block) {
+    prefetch_next(rows, row, column, block.count);
+    const bool at_limit = HWY_DYNAMIC_DISPATCH(load_photo)(rows, row, column, gain, light, block);
+    if (rows.clipped.empty()) return at_limit;
+    const uchar* clipped = rows.clipped[row] + column;
+    return std::any_of(clipped, clipped + block.count, [](uchar c) { return c != 0; });
+}
+
+std::size_t project(const LightSet& set, LeastSquaresBlock& block) { return HWY_DYNAMIC_DISPATCH(project)(set, block); }
 
 void accumulate_albedo(const LightSet& set, LeastSquaresBlock& block) {
     HWY_DYNAMIC_DISPATCH(accumulate_albedo)(set, block);
 }
 
-void finish(float min_albedo, LeastSquaresBlock& block, const BlockResults& results) {
+void finish(float min_albedo, const LeastSquaresBlock& block, const BlockResults& results) {
     HWY_DYNAMIC_DISPATCH(finish)(min_albedo, block, results);
 }
 
 bool clipped_at(const PhotoRows& rows, int row, int column) {
     if (!rows.clipped.empty()) return rows.clipped(row, column) != 0;
-    const cv::Range here(row, row + 1), there(column, column + 1);
-    PhotoRows pixel;
-    pixel.samples = rows.samples(here, there);
-    pixel.limit = rows.limit;
-    return clipped_of(pixel)(0, 0) != 0;
+    const auto at_limit = [&]<class Sample>(const Sample* rgb) {
+        return static_cast<float>(std::max({rgb[0], rgb[1], rgb[2]})) >= rows.limit;
+    };
+    switch (rows.samples.depth()) {
+        case CV_8U:
+            return at_limit(rows.samples.ptr<std::uint8_t>(row, column));
+        case CV_16U:
+            return at_limit(rows.samples.ptr<std::uint16_t>(row, column));
+        default:
+            return at_limit(rows.samples.ptr<float>(row, column));
+    }
 }
 
 }  // namespace darkbox

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 
 #include "processing/maps/photo_source.h"
@@ -29,35 +30,38 @@ struct LeastSquaresBlock {
     float value(std::size_t light, int channel, std::size_t i) const { return rgb(light)[channel].at[i]; }
 
     int count = 0;
-    std::unique_ptr<Plane[]> samples;  ///< radiance over intensity: R, G, B planes of each light
-    Plane clipped;                     ///< 1 where any light's sample is clipped, else 0
-    std::array<Plane, 3> g;            ///< albedo times normal: x, y, z
-    std::array<Plane, 3> colour;       ///< sum of I_c (g.L)+
-    Plane lit_weight;                  ///< sum of (g.L)+^2
-    Plane squared;                     ///< sum of squared residuals
-    Plane samples_used;                ///< lights behind each pixel
-    Plane usable;                      ///< 1 on the object where all samples are finite, else 0; after finish(): valid
+    std::unique_ptr<Plane[]> samples;               ///< radiance over intensity: R, G, B planes of each light
+    std::array<std::uint8_t, block_pixels> mask{};  ///< not 0 on the object
+    std::array<Plane, 3> g;                         ///< albedo times normal: x, y, z
+    std::array<Plane, 3> colour;                    ///< sum of I_c (g.L)+
+    Plane lit_weight;                               ///< sum of (g.L)+^2
+    Plane squared;                                  ///< sum of squared residuals
+    Plane samples_used;                             ///< lights behind each pixel
+    Plane usable;                                   ///< 1 on the object where all samples are finite, else 0
 };
 
-/// Where a block's results go: the places of its first pixel, interleaved like the maps.
+/// Where a block's results go: the places of its first pixel in the maps.
 struct BlockResults {
-    float* normal;
-    float* albedo;
+    float* normal;  ///< interleaved
+    float* albedo;  ///< interleaved
     float* residual;
+    std::uint8_t* valid;
+    std::uint16_t* lights_used;
 };
 
-/// One light's samples: rows' pixels [column, column + block.count) of `row`.
-void load_photo(const PhotoRows& rows, int row, int column, const std::array<float, 3>& gain, std::size_t light,
+/// One light's samples: rows' pixels [column, column + block.count) of `row`. Returns whether any of them is clipped.
+bool load_photo(const PhotoRows& rows, int row, int column, const std::array<float, 3>& gain, std::size_t light,
                 LeastSquaresBlock& block);
 
-/// g over all lights through the shared pseudo-inverse.
-void project(const LightSet& set, LeastSquaresBlock& block);
+/// g over all lights through the shared pseudo-inverse, and which pixels are usable: on the object, and without a
+/// sample that is not finite, which leaves its trace in g. Returns how many pixels of the object are not finite.
+std::size_t project(const LightSet& set, LeastSquaresBlock& block);
 
 /// The sums behind albedo and residual over all lights. They use g where N is meant: the scale |g| cancels in finish().
 void accumulate_albedo(const LightSet& set, LeastSquaresBlock& block);
 
-/// Normal, albedo and residual of usable pixels that are not too dark; zeros for the others.
-void finish(float min_albedo, LeastSquaresBlock& block, const BlockResults& results);
+/// Results of usable pixels that are not too dark; zeros for the others.
+void finish(float min_albedo, const LeastSquaresBlock& block, const BlockResults& results);
 
 /// Is this pixel of one photograph clipped?
 bool clipped_at(const PhotoRows& rows, int row, int column);

@@ -83,13 +83,17 @@ cv::Mat1b with_small_holes_filled(const cv::Mat1b& mask) {
 
 }  // namespace
 
-cv::Mat1b automatic_mask(const std::vector<cv::Mat3f>& images, const std::vector<cv::Vec3d>& without) {
-    if (images.empty()) throw InputError("there are no photographs", "give a session with lit frames");
+cv::Mat1b mask_of_brightest(const cv::Mat1f& brightest, const std::vector<cv::Vec3d>& without) {
     cv::Mat1b mask;
-    cv::threshold(encoded(brightest(images)), mask, 0, 255, cv::THRESH_BINARY | cv::THRESH_OTSU);
+    cv::threshold(encoded(brightest), mask, 0, 255, cv::THRESH_BINARY | cv::THRESH_OTSU);
     leave_out(mask, without);
     cv::morphologyEx(mask, mask, cv::MORPH_OPEN, cv::getStructuringElement(cv::MORPH_ELLIPSE, {3, 3}));
     return with_small_holes_filled(largest_part(mask));
+}
+
+cv::Mat1b automatic_mask(const std::vector<cv::Mat3f>& images, const std::vector<cv::Vec3d>& without) {
+    if (images.empty()) throw InputError("there are no photographs", "give a session with lit frames");
+    return mask_of_brightest(brightest(images), without);
 }
 
 }  // namespace darkbox

@@ -62,25 +62,23 @@ NormalsSummary run_normals(const Session& session, const PhotometricStereoOption
     require_solvable(lights);
     NormalsSummary summary;
     Stopwatch watch;
-    const PhotoStack stack = load_stack(session, work);
-    summary.seconds.read = watch.lap();
-    step(work, {"solving normals", 0, 1, ""});
-    const PhotometricStereoResult solved = photometric_stereo(stack, lights, options, work);
-    watch.lap();
+    SessionPhotos photos(session);
+    const PhotometricStereoResult solved = photometric_stereo(photos, lights, options, work);
     summary.seconds.solve = solved.seconds;
+    summary.seconds.read = std::max(0.0, watch.lap() - solved.seconds);
     summary.solver = "lsq";
     summary.images = static_cast<std::size_t>(direction_matrix(lights).rows());
     summary.pixels = solved.pixels;
     summary.residual_rms = solved.residual_rms;
     summary.mean_angular_error_deg = error_against_truth(session, solved.normals);
-    const double megapixels = static_cast<double>(stack.mask.total()) / 1e6;
+    const double megapixels = static_cast<double>(photos.size().area()) / 1e6;
     summary.megapixel_images_per_second =
         megapixels * static_cast<double>(summary.images) / std::max(solved.seconds, 1e-9);
     if (const auto curve = doubtful_curve(session))
-        if (const auto warning = transfer_warning(stack, lights, *curve, solved.residual_rms, work))
+        if (const auto warning = transfer_warning(photos.kept_rows(), photos.kept_mask(), lights, *curve, work))
             summary.warnings.push_back(*warning);
     FrameTally tally;
-    tally.add(stack);
+    tally.add(photos.kept_stack());
     for (std::string& warning : tally.warnings(lights)) summary.warnings.push_back(std::move(warning));
     watch.lap();
     remove_derived(session, {"texels", "shading"});

@@ -8,6 +8,8 @@
 #include "acquisition/frame/progress.h"
 #include "acquisition/session/session.h"
 #include "processing/maps/maps.h"
+#include "processing/maps/photo_source.h"
+#include "processing/pipeline/radiance.h"
 
 namespace darkbox {
 
@@ -16,6 +18,43 @@ namespace darkbox {
 /// else found by automatic_mask(). Throws InputError for no lit frame, frames that cannot be read, or sizes that
 /// differ.
 PhotoStack load_stack(const Session& session, const WorkContext& work = {});
+
+/// The same photographs for stages that work by bands of rows: nothing is held whole but what the mask needs, where it
+/// is not given. Thread-compatible.
+class SessionPhotos : public PhotoSource {
+public:
+    /// Opens the files. Throws InputError as load_stack() does.
+    explicit SessionPhotos(const Session& session);
+
+    cv::Size size() const override { return frames_.size(); }
+    std::size_t count() const override { return frames_.count(); }
+    std::size_t bytes_per_row() const override { return frames_.bytes_per_row(); }
+    std::size_t bytes_held() const override;
+    void read_next(int rows, PhotoBand& band) override;
+    cv::Mat1b mask() const override;
+
+    /// Some of the rows read so far, in order, spread evenly over the picture: all of them for small pictures, else so
+    /// many that all photographs together hold `most_kept_samples` pixels. For checks that need no more.
+    const std::vector<PhotoRows>& kept_rows() const { return kept_; }
+    /// The mask of these rows; ask after the last band.
+    cv::Mat1b kept_mask() const;
+    /// Both as linear radiance.
+    PhotoStack kept_stack() const;
+
+    static constexpr std::size_t most_kept_samples = 4'000'000;
+
+private:
+    void look_for_brightest(const PhotoBand& band);
+    void keep_rows(const PhotoBand& band);
+
+    FrameBands frames_;
+    std::vector<std::string> files_;
+    std::optional<cv::Mat1b> given_mask_;
+    std::vector<cv::Vec3d> balls_;  ///< in view beside the object
+    cv::Mat1f brightest_;           ///< greatest luminance under any lamp; empty where the mask is given
+    int keep_every_ = 1;
+    std::vector<PhotoRows> kept_;
+};
 
 struct BallFrames {
     std::vector<cv::Mat3f> frames;   ///< linear radiance, one per lit frame
@@ -28,5 +67,7 @@ BallFrames load_ball_frames(const Session& session, const WorkContext& work = {}
 /// Pixels lit well above the background in the brightest of all images (Otsu's threshold), largest connected part,
 /// holes filled, without the discs (x, y, radius in pixels) to be left out. Throws InputError when nothing is lit.
 cv::Mat1b automatic_mask(const std::vector<cv::Mat3f>& images, const std::vector<cv::Vec3d>& without);
+/// The same from the greatest channel mean that each pixel showed under any lamp.
+cv::Mat1b mask_of_brightest(const cv::Mat1f& brightest, const std::vector<cv::Vec3d>& without);
 
 }  // namespace darkbox

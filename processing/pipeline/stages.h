@@ -18,6 +18,8 @@ namespace darkbox {
 // The stages over a sealed session. Each reads what earlier stages left in the session's folder, writes its own files
 // atomically and returns what `--json` shows. A missing artefact is an InputError whose hint is the command to run.
 
+/// Wall time. Where a stage reads while it solves, `solve` is the busy time of all threads with solving over their
+/// number, and `read` is what else the pass over the photographs took.
 struct StageSeconds {
     double read = 0;
     double solve = 0;

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "processing/formats/srgb.h"
 #include "processing/normals/photometric_stereo.h"
+#include "processing/pipeline/radiance.h"
 
 namespace darkbox {
 namespace {
@@ -11,38 +11,37 @@ namespace {
 constexpr double clearly_better = 0.75;
 constexpr double least_residual = 1e-3;  // of the mean radiance: below it either curve fits, or too few samples do
 
-double mean_radiance(const PhotoStack& stack) {
+double mean_radiance(const std::vector<PhotoRows>& photos, const cv::Mat1b& mask) {
     double sum = 0;
-    for (const cv::Mat3f& image : stack.images) {
-        const cv::Scalar mean = cv::mean(image, stack.mask);
+    for (const PhotoRows& photo : photos) {
+        const cv::Scalar mean = cv::mean(radiance_of(photo), mask);
         sum += (mean[0] + mean[1] + mean[2]) / 3.0;
     }
-    return sum / static_cast<double>(stack.images.size());
-}
-
-cv::Mat3f encoded(const cv::Mat3f& linear) {
-    cv::Mat3f srgb(linear.size());
-    for (int y = 0; y < linear.rows; ++y)
-        for (int x = 0; x < linear.cols; ++x)
-            for (int c = 0; c < 3; ++c) srgb(y, x)[c] = srgb_from_linear(linear(y, x)[c]);
-    return srgb;
+    return sum / static_cast<double>(photos.size());
 }
 
 /// The same samples as if the other curve had been chosen at import.
-PhotoStack under_other_curve(const PhotoStack& stack, TransferCurve curve) {
-    PhotoStack other = stack;
-    for (cv::Mat3f& image : other.images)
-        image = curve == TransferCurve::srgb ? encoded(image) : linear_from_srgb(image);
-    return other;
+std::vector<PhotoRows> under_other_curve(std::vector<PhotoRows> photos, TransferCurve curve) {
+    const auto other = curve == TransferCurve::srgb ? nullptr : srgb_curve(255);
+    for (PhotoRows& photo : photos) photo.curve = other;
+    return photos;
+}
+
+/// The residual as a share of the mean radiance.
+double relative_residual(const std::vector<PhotoRows>& photos, const cv::Mat1b& mask, const Lights& lights,
+                         const WorkContext& work) {
+    PhotosInMemory source(photos, {}, mask);
+    WorkContext silent = work;
+    silent.report = nullptr;
+    return photometric_stereo(source, lights, {}, silent).residual_rms / mean_radiance(photos, mask);
 }
 
 }  // namespace
 
-std::optional<std::string> transfer_warning(const PhotoStack& stack, const Lights& lights, TransferCurve curve,
-                                            double residual_rms, const WorkContext& work) {
-    const PhotoStack other = under_other_curve(stack, curve);
-    const double chosen = residual_rms / mean_radiance(stack);
-    const double instead = photometric_stereo(other, lights, {}, work).residual_rms / mean_radiance(other);
+std::optional<std::string> transfer_warning(const std::vector<PhotoRows>& photos, const cv::Mat1b& mask,
+                                            const Lights& lights, TransferCurve curve, const WorkContext& work) {
+    const double chosen = relative_residual(photos, mask, lights, work);
+    const double instead = relative_residual(under_other_curve(photos, curve), mask, lights, work);
     if (!(chosen > least_residual && instead < clearly_better * chosen)) return std::nullopt;
     const bool srgb = curve == TransferCurve::srgb;
     return fmt::format(

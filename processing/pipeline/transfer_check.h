@@ -2,17 +2,18 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "acquisition/frame/progress.h"
 #include "acquisition/session/session.h"
-#include "processing/maps/maps.h"
+#include "processing/maps/photo_source.h"
 
 namespace darkbox {
 
 /// A warning when the photographs, decoded with `curve`, fit Lambert's law clearly better under the other curve: the
-/// least-squares residual as a share of the mean radiance falls by a quarter or more. `residual_rms` is the stack's
-/// own.
-std::optional<std::string> transfer_warning(const PhotoStack& stack, const Lights& lights, TransferCurve curve,
-                                            double residual_rms, const WorkContext& work);
+/// least-squares residual as a share of the mean radiance falls by a quarter or more. `photos` are 8-bit and whole
+/// pictures or some rows of them.
+std::optional<std::string> transfer_warning(const std::vector<PhotoRows>& photos, const cv::Mat1b& mask,
+                                            const Lights& lights, TransferCurve curve, const WorkContext& work);
 
 }  // namespace darkbox

@@ -102,6 +102,8 @@ void add_normals_options(CLI::App& command, Arguments& a) {
     const std::map<std::string, Solver> solvers{{"lsq", Solver::lsq}};
     command.add_option("--solver", a.options.normals.solver, "lsq: least squares over all lights")
         ->transform(CLI::CheckedTransformer(solvers).description("{lsq}"));
+    command.add_option("--memory-mib", a.options.normals.memory_mib, "Memory for photographs and maps while solving")
+        ->capture_default_str();
 }
 
 void add_texels_options(CLI::App& command, Arguments& a) {

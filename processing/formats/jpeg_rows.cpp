@@ -1,0 +1,106 @@
+#include <csetjmp>
+#include <cstdio>
+#include <string>
+
+#include "processing/formats/picture_header.h"
+#include "processing/formats/row_decoders.h"
+
+// jpeglib.h needs <cstdio> before it; jerror.h needs jpeglib.h.
+#include <jpeglib.h>
+//
+#include <jerror.h>
+
+namespace darkbox {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// libjpeg leaves its functions by longjmp here: those that call them hold nothing that needs a destructor.
+struct JpegDecoder {
+    JpegDecoder() {
+        decompress.err = ::jpeg_std_error(&errors);
+        decompress.client_data = this;
+        errors.error_exit = leave;
+        errors.emit_message = watch;
+        errors.output_message = [](j_common_ptr) {};
+    }
+    JpegDecoder(const JpegDecoder&) = delete;
+    JpegDecoder& operator=(const JpegDecoder&) = delete;
+    ~JpegDecoder() { ::jpeg_destroy_decompress(&decompress); }
+
+    [[noreturn]] static void leave(j_common_ptr common) {
+        auto& self = *static_cast<JpegDecoder*>(common->client_data);
+        common->err->format_message(common, self.error);
+        std::longjmp(self.way_out, 1);
+    }
+    /// libjpeg makes up the rest of a picture that ends early and only warns.
+    static void watch(j_common_ptr common, int level) {
+        const int code = common->err->msg_code;
+        if (level < 0 && (code == JWRN_JPEG_EOF || code == JWRN_HIT_MARKER || code == JWRN_HUFF_BAD_CODE))
+            leave(common);
+    }
+
+    jpeg_decompress_struct decompress{};
+    jpeg_error_mgr errors{};
+    std::jmp_buf way_out{};
+    char error[JMSG_LENGTH_MAX] = "";
+};
+
+bool start(JpegDecoder& decoder, std::FILE* file) {
+    if (setjmp(decoder.way_out) != 0) return false;
+    ::jpeg_create_decompress(&decoder.decompress);
+    ::jpeg_stdio_src(&decoder.decompress, file);
+    ::jpeg_read_header(&decoder.decompress, TRUE);
+    decoder.decompress.out_color_space = JCS_RGB;
+    return true;
+}
+
+bool start_decoding(JpegDecoder& decoder) {
+    if (setjmp(decoder.way_out) != 0) return false;
+    return ::jpeg_start_decompress(&decoder.decompress) == TRUE;
+}
+
+bool read_row(JpegDecoder& decoder, JSAMPROW row) {
+    if (setjmp(decoder.way_out) != 0) return false;
+    return ::jpeg_read_scanlines(&decoder.decompress, &row, 1) == 1;
+}
+
+class JpegRows : public PictureRows {
+public:
+    JpegRows(const std::string& file, FileHandle handle, std::unique_ptr<JpegDecoder> decoder)
+        : PictureRows(
+              {static_cast<int>(decoder->decompress.image_width), static_cast<int>(decoder->decompress.image_height)},
+              CV_8UC3),
+          file_(file),
+          handle_(std::move(handle)),
+          decoder_(std::move(decoder)) {}
+
+    void read(cv::Mat& rows) override {
+        if (!started_) started_ = start_decoding(*decoder_);
+        bool good = started_;
+        for (int y = 0; good && y < rows.rows; ++y) good = read_row(*decoder_, rows.ptr(y));
+        if (!good) throw bad_picture(file_, std::string("is damaged or cut short: ") + decoder_->error);
+    }
+
+private:
+    std::string file_;
+    FileHandle handle_;
+    std::unique_ptr<JpegDecoder> decoder_;
+    bool started_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<PictureRows> open_jpeg_rows(const fs::path& path) {
+    const std::string file = path.string();
+    FileHandle handle = open_for_reading(path);
+    auto decoder = std::make_unique<JpegDecoder>();
+    if (!start(*decoder, handle.get()))
+        throw bad_picture(file, std::string("is damaged or cut short: ") + decoder->error);
+    require_sane_size(decoder->decompress.image_width, decoder->decompress.image_height, file);
+    if (decoder->decompress.jpeg_color_space == JCS_CMYK || decoder->decompress.jpeg_color_space == JCS_YCCK)
+        return open_whole_picture(path);
+    return std::make_unique<JpegRows>(file, std::move(handle), std::move(decoder));
+}
+
+}  // namespace darkbox
