@@ -105,7 +105,7 @@ TEST(Calibrate, GivenBallIsTaken) {
     const BallScene scene;
     const auto lights = dome_of_lights(8);
     CalibrationOptions options;
-    options.ball = Ball{std::round(scene.ball.x), std::round(scene.ball.y), std::round(scene.ball.radius), 1.0};
+    options.balls = {Ball{std::round(scene.ball.x), std::round(scene.ball.y), std::round(scene.ball.radius), 1.0}};
     EXPECT_LT(errors_deg(calibrate(photographs(scene, lights), frame_names(8), options), lights).back(), 0.25);
 }
 
@@ -150,7 +150,7 @@ TEST(Calibrate, NoBallIsAnErrorWithARemedy) {
 
 TEST(Calibrate, BallOutsideThePictureIsAnError) {
     CalibrationOptions options;
-    options.ball = Ball{900, 20, 30, 1.0};
+    options.balls = {Ball{900, 20, 30, 1.0}};
     EXPECT_NE(message_of(photographs({}, dome_of_lights(4)), options).find("outside"), std::string::npos);
 }
 
@@ -158,7 +158,7 @@ TEST(Calibrate, NoHighlightAtAllIsAnError) {
     BallScene scene;
     scene.lamp_radiance = 0;
     CalibrationOptions options;
-    options.ball = scene.ball;
+    options.balls = {scene.ball};
     EXPECT_NE(message_of(photographs(scene, dome_of_lights(4)), options).find("highlight"), std::string::npos);
 }
 
@@ -178,7 +178,7 @@ TEST(Calibrate, FramesOfAnotherSizeAreNamed) {
 
 TEST(CalibrationOptions, RadiusMustBePositive) {
     CalibrationOptions options;
-    options.ball = Ball{10, 10, -4, 1.0};
+    options.balls = {Ball{10, 10, -4, 1.0}};
     EXPECT_THROW(options.validate(), InputError);
 }
 
