@@ -16,6 +16,7 @@ constexpr double rejected_sigmas = 4;
 constexpr double least_contour_reject_px = 0.1;
 constexpr double least_highlight_reject_px = 0.5;  ///< nearer than this no highlight is called wrong
 constexpr int most_rounds = 5;
+constexpr double rim_bias_px = 0.35;  ///< of an outline's centre per axis, on a ball of one pixel's radius
 
 void require_on_balls(const RefineInput& input) {
     for (const BallObservations& ball : input.balls)
@@ -36,8 +37,14 @@ std::vector<Believed> all_of(const RefineInput& input) {
     return believed;
 }
 
+/// How far an outline's centre is off because of what the ball mirrors beside its rim. The mirrored direction turns
+/// with the root of the depth below the rim over the radius, so that brightness rises there unlike a blurred step, on
+/// one side of the ball more than on the other; no circle shows it. Measured on rendered balls in unlike rooms
+/// (docs/decisions/0011).
+double outline_bias_px(double radius_px) { return rim_bias_px / std::sqrt(radius_px); }
+
 /// Leaves out the points off the outline, and learns from the others how far one is to be believed.
-void judge_contour(const BallObservations& ball, const std::vector<double>& distances, const cv::Point2d& centre,
+void judge_contour(const BallObservations& ball, const std::vector<double>& distances, const Ball& outline,
                    Believed& believed, RefinedBall& result) {
     if (ball.contour.empty()) return;
     const double limit = std::max(least_contour_reject_px, rejected_sigmas * robust_sigma(distances));
@@ -55,8 +62,10 @@ void judge_contour(const BallObservations& ball, const std::vector<double>& dist
             result.worst_rejected_px = std::max(result.worst_rejected_px, std::abs(distances[i]));
         }
     }
-    const ContourNoise noise = contour_noise(points, kept, centre);
-    believed.contour_sigma_px = noise.effective_sigma_px();
+    const ContourNoise noise = contour_noise(points, kept, {outline.x, outline.y});
+    // A centre fitted to n points all around is known to sigma times sqrt(2 / n).
+    const double per_point = std::sqrt(static_cast<double>(points.size()) / 2);
+    believed.contour_sigma_px = std::hypot(noise.effective_sigma_px(), outline_bias_px(outline.radius) * per_point);
     result.contour_rms_px = noise.sigma_px;
     result.readings_per_independent = noise.readings_per_independent;
 }
@@ -118,8 +127,7 @@ RefineResult refine(const RefineInput& input) {
         robust.solve();
         for (std::size_t i = 0; i < input.balls.size(); ++i) {
             const MirrorSphere sphere = robust.sphere(i);
-            const Ball outline = outline_of(input.view, sphere);
-            judge_contour(input.balls[i], robust.contour_distances_px(i), {outline.x, outline.y}, believed[i],
+            judge_contour(input.balls[i], robust.contour_distances_px(i), outline_of(input.view, sphere), believed[i],
                           result.balls[i]);
         }
         const std::size_t before = result.rejected.size();
