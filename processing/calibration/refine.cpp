@@ -16,7 +16,6 @@ constexpr double rejected_sigmas = 4;
 constexpr double least_contour_reject_px = 0.1;
 constexpr double least_highlight_reject_px = 0.5;  ///< nearer than this no highlight is called wrong
 constexpr int most_rounds = 5;
-constexpr double rim_bias_px = 0.35;  ///< of an outline's centre per axis, on a ball of one pixel's radius
 
 void require_on_balls(const RefineInput& input) {
     for (const BallObservations& ball : input.balls)
@@ -36,12 +35,6 @@ std::vector<Believed> all_of(const RefineInput& input) {
     }
     return believed;
 }
-
-/// How far an outline's centre is off because of what the ball mirrors beside its rim. The mirrored direction turns
-/// with the root of the depth below the rim over the radius, so that brightness rises there unlike a blurred step, on
-/// one side of the ball more than on the other; no circle shows it. Measured on rendered balls in unlike rooms
-/// (docs/decisions/0011).
-double outline_bias_px(double radius_px) { return rim_bias_px / std::sqrt(radius_px); }
 
 /// Leaves out the points off the outline, and learns from the others how far one is to be believed.
 void judge_contour(const BallObservations& ball, const std::vector<double>& distances, const Ball& outline,
@@ -65,7 +58,7 @@ void judge_contour(const BallObservations& ball, const std::vector<double>& dist
     const ContourNoise noise = contour_noise(points, kept, {outline.x, outline.y});
     // A centre fitted to n points all around is known to sigma times sqrt(2 / n).
     const double per_point = std::sqrt(static_cast<double>(points.size()) / 2);
-    believed.contour_sigma_px = std::hypot(noise.effective_sigma_px(), outline_bias_px(outline.radius) * per_point);
+    believed.contour_sigma_px = std::hypot(noise.effective_sigma_px(), ball.outline_bias_px * per_point);
     result.contour_rms_px = noise.sigma_px;
     result.readings_per_independent = noise.readings_per_independent;
 }

@@ -17,6 +17,7 @@ struct BallObservations {
     double radius_sigma_mm = 1e4;  ///< and its radius
     std::optional<Ball> outline;   ///< believed beforehand, such as a circle drawn by hand
     double outline_sigma_px = 0.5;
+    double outline_bias_px = 0;  ///< standard deviation per axis by which the contour as a whole may be off
     std::vector<std::optional<Highlight>> highlights;  ///< one per frame
 };
 

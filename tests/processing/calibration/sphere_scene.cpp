@@ -50,13 +50,28 @@ SphereRenderer::Ray SphereRenderer::follow(double u, double v) const {
     for (const auto& ball : scene_.balls)
         if (const auto t = distance_to(ball, eye, along)) {
             const Vector3d point = eye + *t * along, normal = (point - ball.centre) / ball.radius;
-            return {Ray::Meets::ball, point, along - 2 * along.dot(normal) * normal};
+            const Vector3d onward = along - 2 * along.dot(normal) * normal;
+            Ray ray = meeting(point, onward);
+            ray.mirrored = true;
+            ray.from = point;
+            ray.along = onward;
+            return ray;
         }
-    if (const auto t = distance_to(scene_.object, eye, along)) {
-        const Vector3d point = eye + *t * along;
-        return {Ray::Meets::object, point, (point - scene_.object.centre) / scene_.object.radius};
+    return meeting(eye, along);
+}
+
+SphereRenderer::Ray SphereRenderer::meeting(const Vector3d& from, const Vector3d& along) const {
+    Ray ray;
+    const auto t = distance_to(scene_.object, from, along);
+    if (t && *t > 0) {
+        ray.meets = Ray::Meets::object;
+        ray.point = from + *t * along;
+        ray.normal = (ray.point - scene_.object.centre) / scene_.object.radius;
+    } else if (along.z() < 0) {
+        ray.meets = Ray::Meets::wall;
+        ray.point = from + (wall_z - from.z()) / along.z() * along;
     }
-    return {Ray::Meets::wall, eye + (wall_z - eye.z()) / along.z() * along, {0, 0, 1}};
+    return ray;
 }
 
 double SphereRenderer::room(const Vector3d& direction) const {
@@ -65,14 +80,18 @@ double SphereRenderer::room(const Vector3d& direction) const {
     return room_radiance * std::max(0.0, sum);
 }
 
-double SphereRenderer::radiance(const Ray& ray, const Vector3d& lamp) const {
+double SphereRenderer::matt_radiance(const Ray& ray, const Vector3d& lamp) const {
     const Vector3d to_lamp = scene_.near ? (lamp - ray.point).normalized() : lamp;
-    if (ray.meets == Ray::Meets::ball) {
-        const double reach = scene_.near ? scene_.lamp_radius / (lamp - ray.point).norm() : scene_.lamp_radius;
-        return ray.along.dot(to_lamp) > std::cos(reach) ? scene_.lamp_radiance : 0.5 * room(ray.along);
-    }
     const double albedo = ray.meets == Ray::Meets::object ? 0.7 : 0.06;
-    return albedo * std::max(0.0, ray.along.dot(to_lamp));
+    return albedo * std::max(0.0, ray.normal.dot(to_lamp));
+}
+
+double SphereRenderer::radiance(const Ray& ray, const Vector3d& lamp) const {
+    if (!ray.mirrored) return ray.meets == Ray::Meets::room ? room(ray.along) : matt_radiance(ray, lamp);
+    const Vector3d to_lamp = scene_.near ? (lamp - ray.from).normalized() : lamp;
+    const double reach = scene_.near ? scene_.lamp_radius / (lamp - ray.from).norm() : scene_.lamp_radius;
+    if (ray.along.dot(to_lamp) > std::cos(reach)) return scene_.lamp_radiance;
+    return 0.5 * (ray.meets == Ray::Meets::room ? room(ray.along) : matt_radiance(ray, lamp));
 }
 
 cv::Mat1f SphereRenderer::render(const Vector3d& lamp) const {

@@ -11,7 +11,7 @@ namespace darkbox::test {
 
 /// Polished balls and a matt one before a dim wall, under one round lamp at a time. Millimetres, viewer frame, the
 /// optical axis through the picture's centre. Written without the code under test: every sub-pixel's view ray is
-/// followed to what it meets, and from a polished ball on to the lamp or a dim room.
+/// followed to what it meets, and from a polished ball on to the lamp, the matt ball, the wall or a dim room.
 struct SphereScene {
     struct Sphere {
         Eigen::Vector3d centre{0, 0, 0};
@@ -46,16 +46,21 @@ public:
 
 private:
     struct Ray {
-        enum class Meets { ball, object, wall } meets = Meets::wall;
+        enum class Meets { object, wall, room } meets = Meets::room;
         Eigen::Vector3d point{0, 0, 0};
-        Eigen::Vector3d along{0, 0, 1};  ///< a ball's mirrored ray; the others' normal
+        Eigen::Vector3d normal{0, 0, 1};
+        bool mirrored = false;  ///< by a ball, from which it went on:
+        Eigen::Vector3d from{0, 0, 0};
+        Eigen::Vector3d along{0, 0, 1};
     };
     struct Wave {
         Eigen::Vector3d along;
         double phase;
     };
     Ray follow(double u, double v) const;
+    Ray meeting(const Eigen::Vector3d& from, const Eigen::Vector3d& along) const;
     double radiance(const Ray& ray, const Eigen::Vector3d& lamp) const;
+    double matt_radiance(const Ray& ray, const Eigen::Vector3d& lamp) const;
     double room(const Eigen::Vector3d& direction) const;
 
     SphereScene scene_;
