@@ -132,7 +132,8 @@ RayTracer::RayTracer(const Scene& scene) : state_(new State{scene, {}, {}}) {
         else
             attach(mesh_geometry(device, std::get<TriangleMesh>(shape)), i);
     }
-    if (scene.ball) attach(sphere_geometry(device, scene.ball->sphere), scene.object.size());
+    for (std::size_t i = 0; i < scene.balls.size(); ++i)
+        attach(sphere_geometry(device, scene.balls[i].sphere), scene.object.size() + i);
     rtcCommitScene(state_->tree.get());
 }
 
@@ -145,9 +146,10 @@ std::optional<RayHit> RayTracer::first_hit(const Ray& ray) const {
     embree_intersect(state_->tree.get(), &found);
     if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
     const Scene& scene = state_->scene;
-    if (found.hit.geomID == scene.object.size()) {
-        RayHit hit = on_sphere(scene.ball->sphere, ray, found.ray.tfar);
-        hit.on_ball = true;
+    if (found.hit.geomID >= scene.object.size()) {
+        const MirrorBall& ball = scene.balls[found.hit.geomID - scene.object.size()];
+        RayHit hit = on_sphere(ball.sphere, ray, found.ray.tfar);
+        hit.ball = &ball;
         return hit;
     }
     const Surface& surface = scene.object[found.hit.geomID];

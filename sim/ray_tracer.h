@@ -10,15 +10,15 @@ namespace darkbox::sim {
 
 /// Where a ray meets the scene's solid things.
 struct RayHit {
-    bool on_ball = false;
-    const Material* material = nullptr;  ///< none for the ball
+    const MirrorBall* ball = nullptr;    ///< none for the object
+    const Material* material = nullptr;  ///< none for a ball
     double distance_mm = 0.0;
     Vec3 geometric_normal;  ///< unit, towards where the ray came from
     Vec3 normal;            ///< unit, of the smooth surface, on the same side
     SurfacePoint point;
 };
 
-/// The scene's surfaces and ball in Embree's tree. Robust traversal and a tree built by one thread: the same hits on
+/// The scene's surfaces and balls in Embree's tree. Robust traversal and a tree built by one thread: the same hits on
 /// any number of threads. Refers to the scene it was made from. Const members are thread-safe.
 class RayTracer {
 public:

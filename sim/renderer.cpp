@@ -29,6 +29,7 @@ struct Renderer::Sample {
         Ray ray;
         double distance_mm = 0.0;  ///< to the solid thing it meets; infinite when that is the box
         Fragment seen;
+        double reflectance = 0.0;
     };
     Fragment seen;
     bool shows_object = false;
@@ -98,8 +99,8 @@ Renderer::Fragment Renderer::box_fragment(const Ray& ray) const {
 Renderer::Fragment Renderer::fragment(const Ray& ray, const std::optional<RayHit>& hit) const {
     if (!hit) return box_fragment(ray);
     Fragment seen{hit->point.position, hit->geometric_normal, hit->normal, hit->normal, -ray.direction, {}};
-    if (hit->on_ball) {
-        seen.albedo = scene_.ball->body;
+    if (hit->ball != nullptr) {
+        seen.albedo = hit->ball->body;
         return seen;
     }
     const Material& material = *hit->material;
@@ -112,12 +113,12 @@ Renderer::Fragment Renderer::fragment(const Ray& ray, const std::optional<RayHit
 
 Renderer::Sample Renderer::sample(const Ray& ray) const {
     const auto hit = tracer_.first_hit(ray);
-    Sample result{fragment(ray, hit), hit && !hit->on_ball, std::nullopt};
-    if (hit && hit->on_ball) {
+    Sample result{fragment(ray, hit), hit && hit->ball == nullptr, std::nullopt};
+    if (hit && hit->ball != nullptr) {
         const Ray onward{hit->point.position + hit->normal * shadow_offset_mm, mirrored(ray.direction, hit->normal)};
         const auto next = tracer_.first_hit(onward);
         result.reflection = {onward, next ? next->distance_mm : std::numeric_limits<double>::infinity(),
-                             fragment(onward, next)};
+                             fragment(onward, next), hit->ball->reflectance};
     }
     return result;
 }
@@ -153,7 +154,7 @@ Rgb Renderer::radiance(const Sample& s, const SceneLamp& lamp) const {
     Rgb sum = radiance(s.seen, lamp);
     if (s.reflection) {
         const auto& r = *s.reflection;
-        sum += (radiance(r.seen, lamp) + glow(r.ray, lamp, r.distance_mm)) * scene_.ball->reflectance;
+        sum += (radiance(r.seen, lamp) + glow(r.ray, lamp, r.distance_mm)) * r.reflectance;
     }
     return sum;
 }

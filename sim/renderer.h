@@ -22,7 +22,7 @@ struct SceneTruth {
     std::vector<float> heights;  ///< z of what the pixel's centre shows, viewer frame, mm
 };
 
-/// Traces rays from the camera: direct light with shadows, and one reflection on the mirror ball. Interreflection on
+/// Traces rays from the camera: direct light with shadows, and one reflection on the mirror balls. Interreflection on
 /// the object is left out, so that Lambert's and Phong's laws hold exactly. Refers to the scene. The same bits on any
 /// number of threads; const members are thread-safe.
 class Renderer {

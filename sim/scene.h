@@ -87,7 +87,7 @@ struct Box {
 struct Scene {
     std::string name;
     std::vector<Surface> object;
-    std::optional<MirrorBall> ball;
+    std::vector<MirrorBall> balls;
     std::vector<SceneLamp> lamps;
     LampModel lamp_model = LampModel::distant;
     View view;

@@ -94,11 +94,13 @@ struct SceneName {
     bool near = false;
     bool perspective = false;
     bool phong = false;
+    int balls = 1;
 };
 
 [[noreturn]] void throw_unknown(const std::string& name, const std::string& problem) {
     throw InputError(fmt::format("unknown simulated scene '{}': {}", name, problem),
-                     fmt::format("join a shape ({}), a texture ({}) and, if wanted, near, perspective or phong by '-', "
+                     fmt::format("join a shape ({}), a texture ({}) and, if wanted, near, perspective, phong, "
+                                 "twoballs or threeballs by '-', "
                                  "for example brick-torus or teapot-moss-near",
                                  fmt::join(keys(shape_makers()), ", "), fmt::join(keys(texture_makers()), ", ")));
 }
@@ -117,6 +119,10 @@ SceneName parse_scene_name(const std::string& name) {
             parsed.perspective = true;
         else if (word == "phong")
             parsed.phong = true;
+        else if (word == "twoballs")
+            parsed.balls = 2;
+        else if (word == "threeballs")
+            parsed.balls = 3;
         else
             throw_unknown(name, fmt::format("'{}' is neither a shape, a texture nor a suffix", word));
     }
@@ -124,14 +130,20 @@ SceneName parse_scene_name(const std::string& name) {
     return parsed;
 }
 
-MirrorBall ball_in_corner(const View& view, double diameter_mm) {
+/// Along the left border: in the lower corner, the upper one, and between them.
+std::vector<MirrorBall> balls_on_the_left(const View& view, double diameter_mm, int count) {
     const double radius = 0.5 * diameter_mm;
     const double inset = radius + margin_mm;
-    MirrorBall ball;
-    ball.sphere.centre = {inset - 0.5 * view.width * view.mm_per_pixel, inset - 0.5 * view.height * view.mm_per_pixel,
-                          0.0};
-    ball.sphere.radius_mm = radius;
-    return ball;
+    const double x = inset - 0.5 * view.width * view.mm_per_pixel;
+    const double low = inset - 0.5 * view.height * view.mm_per_pixel;
+    std::vector<MirrorBall> balls;
+    for (const double y : {low, -low, 0.0}) {
+        if (static_cast<int>(balls.size()) == count) break;
+        MirrorBall ball;
+        ball.sphere = {{x, y, 0.0}, radius};
+        balls.push_back(ball);
+    }
+    return balls;
 }
 
 View view_of(const SimDescription& sim, const SceneName& name) {
@@ -140,6 +152,7 @@ View view_of(const SimDescription& sim, const SceneName& name) {
     view.width = sim.width;
     view.height = sim.height;
     view.mm_per_pixel = field_of_view_mm / sim.width;
+    view.distance_mm = sim.camera_distance_mm;
     return view;
 }
 
@@ -157,7 +170,7 @@ Scene scene_by_name(const SimDescription& sim, const std::vector<LampDescription
         scene.lamps.push_back({lamp.name, {lamp.position_mm[0], lamp.position_mm[1], lamp.position_mm[2]}});
     scene.lamp_model = name.near ? LampModel::near : LampModel::distant;
     scene.view = view_of(sim, name);
-    scene.ball = ball_in_corner(scene.view, ball_diameter_mm);
+    scene.balls = balls_on_the_left(scene.view, ball_diameter_mm, name.balls);
     return scene;
 }
 

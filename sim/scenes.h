@@ -10,8 +10,9 @@ namespace darkbox::sim {
 
 /// The scene that `sim.scene` names: a shape (sphere, torus, teapot, relief) and a texture (lambert, stone, moss,
 /// marble, speckle, brick; lambert when none is named) joined by "-" in either order, and any of the suffixes "near"
-/// (near lamps with 1/d^2), "perspective" and "phong" (a glossy coat): "brick-torus", "teapot-moss-near". The picture
-/// is 200 mm wide at the object; the mirror ball stands in its lower left corner. `ball_diameter_mm` of the
+/// (near lamps with 1/d^2), "perspective", "phong" (a glossy coat), "twoballs" and "threeballs": "brick-torus",
+/// "teapot-moss-near". The picture is 200 mm wide at the object; a mirror ball stands in its lower left corner, others
+/// above it. `ball_diameter_mm` of the
 /// description, or 36. Throws InputError with the known words when a word is unknown.
 Scene scene_by_name(const SimDescription& sim, const std::vector<LampDescription>& lamps,
                     double ball_diameter_mm = 36.0);

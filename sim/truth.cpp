@@ -83,9 +83,14 @@ std::string lamps_json(const Scene& scene, const std::vector<ExposureTruth>& exp
 
 std::string ball_json(const Scene& scene) {
     nlohmann::json balls = nlohmann::json::array();
-    if (scene.ball) {
-        const BallCircle circle = ball_circle(scene.view, scene.ball->sphere);
-        balls.push_back({{"x", circle.centre.u}, {"y", circle.centre.v}, {"radius", circle.radius}});
+    for (const MirrorBall& ball : scene.balls) {
+        const BallCircle circle = ball_circle(scene.view, ball.sphere);
+        const Vec3& centre = ball.sphere.centre;
+        balls.push_back({{"x", circle.centre.u},
+                         {"y", circle.centre.v},
+                         {"radius", circle.radius},
+                         {"centre_mm", {centre.x, centre.y, centre.z}},
+                         {"radius_mm", ball.sphere.radius_mm}});
     }
     return nlohmann::json{{"balls", balls}}.dump(2) + "\n";
 }

@@ -16,6 +16,7 @@ constexpr std::size_t longest_name = 1024;
 constexpr int largest_side = 65'535;
 constexpr int deepest_sample = 32;
 constexpr int most_shots = 100'000;
+constexpr double largest_offset_px = 1e6;  ///< of the principal point, outside the picture
 
 [[noreturn]] void refuse(const std::string& where, std::string_view field, const std::string& value,
                          std::string_view allowed) {
@@ -31,6 +32,11 @@ void require_between(const std::string& where, std::string_view field, int value
 void require_finite(const std::string& where, std::string_view field, double value, double least) {
     if (!std::isfinite(value) || value < least)
         refuse(where, field, fmt::format("{}", value), fmt::format("a number of at least {}", least));
+}
+
+void require_length(const std::string& where, std::string_view field, const std::optional<double>& mm) {
+    if (mm && !(std::isfinite(*mm) && *mm > 0))
+        refuse(where, field, fmt::format("{}", *mm), "a number of more than 0 mm");
 }
 
 /// Bytes in the UTF-8 sequence that `first` begins (RFC 3629); 0 when it begins none.
@@ -111,9 +117,26 @@ void require_sha256(const std::string& where, std::string_view hex) {
         refuse(where, "sha256", shown(hex), "64 lower-case hexadecimal digits");
 }
 
+void require_valid(const std::string& where, const CaptureGeometry& geometry) {
+    require_length(where, "mm_per_pixel", geometry.mm_per_pixel);
+    require_length(where, "camera_distance_mm", geometry.camera_distance_mm);
+    require_length(where, "ball_diameter_mm", geometry.ball_diameter_mm);
+    if (geometry.principal_px)
+        for (const double coordinate : *geometry.principal_px)
+            require_finite(where, "principal_px", coordinate, -largest_offset_px);
+    for (const NominalLamp& lamp : geometry.lamps) {
+        double squared = 0;
+        for (const double coordinate : lamp.position_mm) squared += coordinate * coordinate;
+        if (!(squared > 0 && std::isfinite(squared)))
+            refuse(where, fmt::format("position_mm of lamp {}", shown(lamp.name)), fmt::format("{} mm off", squared),
+                   "three numbers that are not all 0");
+    }
+}
+
 void require_valid(const std::string& where, const SessionInfo& info) {
     require_between(where, "schema_version", info.schema_version, session_schema, session_schema);
     require_between(where, "planned_shots", info.planned_shots, 0, most_shots);
+    if (info.geometry) require_valid(where, *info.geometry);
 }
 
 void require_valid(const std::string& where, const FrameRecord& record) {

@@ -19,6 +19,7 @@ void require_payload_name(const std::string& where, const std::string& name);
 
 void require_sha256(const std::string& where, std::string_view hex);
 
+void require_valid(const std::string& where, const CaptureGeometry& geometry);
 void require_valid(const std::string& where, const SessionInfo& info);
 
 /// Everything about a record but its checksum.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -57,6 +58,26 @@ struct SessionEvent {
     std::string what;
 };
 
+/// Where a lamp is meant to stand: rig frame (x right, y up, z to the camera, origin at the object), mm.
+struct NominalLamp {
+    std::string name;  ///< as in FrameRecord::lamp_name
+    std::array<double, 3> position_mm{};
+
+    friend bool operator==(const NominalLamp&, const NominalLamp&) = default;
+};
+
+/// What is known of the capture's geometry, for calibration. Each part may be missing.
+struct CaptureGeometry {
+    std::optional<double> mm_per_pixel;                 ///< in the plane of the object
+    std::optional<double> camera_distance_mm;           ///< from the object; none: orthographic
+    std::optional<std::array<double, 2>> principal_px;  ///< none: the picture's centre
+    std::optional<double> ball_diameter_mm;             ///< of every mirror ball
+    bool distant_lamps = false;                         ///< their light is parallel, wherever they stand
+    std::vector<NominalLamp> lamps;
+
+    friend bool operator==(const CaptureGeometry&, const CaptureGeometry&) = default;
+};
+
 /// What holds for a whole session.
 struct SessionInfo {
     int schema_version = 1;
@@ -67,6 +88,7 @@ struct SessionInfo {
     std::string camera;              ///< model and id
     int planned_shots = 0;           ///< frames the session needs to be complete
     std::vector<std::string> notes;  ///< choices made on the way in, such as the transfer curve, in words
+    std::optional<CaptureGeometry> geometry = {};
 };
 
 /// A sealed session, read only. Thread-compatible; const members are thread-safe.

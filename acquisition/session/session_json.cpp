@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -68,6 +70,17 @@ public:
         return value.get<double>();
     }
 
+    template <std::size_t count>
+    std::array<double, count> numbers(const char* key) const {
+        const Json& value = array(key);
+        std::array<double, count> numbers{};
+        const bool fits = value.size() == count && std::all_of(value.begin(), value.end(),
+                                                               [](const Json& element) { return element.is_number(); });
+        if (!fits) wrong_type(key, fmt::format("a list of {} numbers", count));
+        std::transform(value.begin(), value.end(), numbers.begin(), [](const Json& e) { return e.get<double>(); });
+        return numbers;
+    }
+
     bool flag(const char* key) const {
         const Json& value = member(key);
         if (!value.is_boolean()) wrong_type(key, "true or false");
@@ -108,10 +121,27 @@ private:
 /// Text that is not UTF-8 is kept readable, with U+FFFD for what is wrong; file names are checked before.
 std::string dump(const Json& json, int indent) { return json.dump(indent, ' ', false, Json::error_handler_t::replace); }
 
+/// What is not known is left out.
+Json json_of(const CaptureGeometry& geometry) {
+    Json json = Json::object();
+    if (geometry.mm_per_pixel) json["mm_per_pixel"] = *geometry.mm_per_pixel;
+    if (geometry.camera_distance_mm) json["camera_distance_mm"] = *geometry.camera_distance_mm;
+    if (geometry.principal_px) json["principal_px"] = *geometry.principal_px;
+    if (geometry.ball_diameter_mm) json["ball_diameter_mm"] = *geometry.ball_diameter_mm;
+    json["distant_lamps"] = geometry.distant_lamps;
+    Json lamps = Json::array();
+    for (const NominalLamp& lamp : geometry.lamps)
+        lamps.push_back({{"name", lamp.name}, {"position_mm", lamp.position_mm}});
+    json["lamps"] = std::move(lamps);
+    return json;
+}
+
 Json json_of(const SessionInfo& info) {
-    return {{"object", info.object}, {"created", info.created}, {"source", info.source},
-            {"rig", info.rig},       {"camera", info.camera},   {"planned_shots", info.planned_shots},
-            {"notes", info.notes}};
+    Json json{{"object", info.object}, {"created", info.created}, {"source", info.source},
+              {"rig", info.rig},       {"camera", info.camera},   {"planned_shots", info.planned_shots},
+              {"notes", info.notes}};
+    if (info.geometry) json["geometry"] = json_of(*info.geometry);
+    return json;
 }
 
 Json json_of(const SessionEvent& event) { return {{"when", event.when}, {"what", event.what}}; }
@@ -147,6 +177,23 @@ int known_schema(const Fields& fields) {
     return version;
 }
 
+CaptureGeometry geometry_from(const Fields& fields) {
+    CaptureGeometry geometry;
+    const auto number = [&](const char* key) {
+        return fields.has(key) ? std::optional(fields.number(key)) : std::nullopt;
+    };
+    geometry.mm_per_pixel = number("mm_per_pixel");
+    geometry.camera_distance_mm = number("camera_distance_mm");
+    geometry.ball_diameter_mm = number("ball_diameter_mm");
+    if (fields.has("principal_px")) geometry.principal_px = fields.numbers<2>("principal_px");
+    geometry.distant_lamps = fields.flag("distant_lamps");
+    for (const Json& lamp : fields.array("lamps")) {
+        const Fields one(fields.where(), lamp);
+        geometry.lamps.push_back({one.text("name"), one.numbers<3>("position_mm")});
+    }
+    return geometry;
+}
+
 SessionInfo info_from(const Fields& fields) {
     SessionInfo info;
     info.object = fields.text("object");
@@ -159,6 +206,7 @@ SessionInfo info_from(const Fields& fields) {
         if (!note.is_string()) refuse(fields.where(), "\"notes\" is not a list of texts");
         info.notes.push_back(note.get<std::string>());
     }
+    if (fields.has("geometry")) info.geometry = geometry_from({fields.where(), fields.member("geometry")});
     require_valid(fields.where(), info);
     return info;
 }

@@ -7,31 +7,23 @@
 #include <cmath>
 
 #include "acquisition/frame/error.h"
-#include "processing/calibration/ball_contour.h"
-#include "processing/calibration/ball_search.h"
+#include "processing/calibration/first_lights.h"
 #include "processing/calibration/highlight.h"
-#include "processing/calibration/outline.h"
+#include "processing/calibration/locate.h"
 #include "processing/calibration/refine.h"
+#include "processing/calibration/reflect.h"
 #include "processing/calibration/warnings.h"
 
 namespace darkbox {
 namespace {
 
-constexpr double given_ball_sigma_px = 0.5;  ///< a circle drawn by hand
-constexpr double hand_sigma_px = 0.5;        ///< a highlight read by hand
-constexpr double least_support = 0.15;       ///< share of the outline below which contour points say nothing
-constexpr double far_sigma_px = 1e3;         ///< of a circle that the contour alone decides
-constexpr double least_contour_sigma_px = 0.05;
+constexpr double hand_sigma_px = 0.5;          ///< a highlight read by hand
+constexpr double rim_bias_px = 0.07;           ///< of an outline's centre per axis, on a ball of one pixel's radius
+constexpr double ball_depth_sigma_mm = 10;     ///< balls stand about as far off as the object
+constexpr double ball_size_tolerance = 0.002;  ///< of a diameter that tells a perspective camera the depth
+constexpr double size_mismatch = 0.03;         ///< of the diameter: the scale or the diameter is wrong
 
-/// The ball and what is known of its outline.
-struct LocatedBall {
-    Circle circle;
-    std::vector<cv::Point2d> contour;
-    double contour_sigma_px = 0.3;
-    double circle_sigma_px = far_sigma_px;
-    double confidence = 1;
-    std::size_t rejected = 0;
-};
+using Readings = std::vector<std::optional<Highlight>>;  // one per frame
 
 void require_frames(const std::vector<cv::Mat3f>& frames, const std::vector<std::string>& files) {
     if (frames.empty()) throw InputError("there are no frames of the ball", "give at least three, one per lamp");
@@ -53,101 +45,239 @@ std::size_t index_of(const std::string& file, const std::vector<std::string>& fi
     return static_cast<std::size_t>(at - files.begin());
 }
 
-void require_inside(const Ball& ball, cv::Size size) {
-    if (ball.x < 0 || ball.y < 0 || ball.x > size.width - 1 || ball.y > size.height - 1)
-        throw InputError(fmt::format("the ball's centre ({:.1f}, {:.1f}) lies outside the picture of {}x{} pixels",
-                                     ball.x, ball.y, size.width, size.height),
-                         "give --ball X,Y,R in pixels from the top left corner");
-    if (ball.radius > std::max(size.width, size.height))
-        throw InputError(fmt::format("the ball's radius of {:.1f} pixels is larger than the picture of {}x{}",
-                                     ball.radius, size.width, size.height),
-                         "give --ball X,Y,R with the radius, in pixels");
+void require_names(const CalibrationOptions& options, const std::vector<std::string>& files) {
+    for (const auto& [file, at] : options.highlights) index_of(file, files);
+    for (const std::string& file : options.drop) index_of(file, files);
+    if (options.nominal && options.nominal->position_in_rig_mm.size() != files.size())
+        throw InputError(fmt::format("nominal.position_in_rig_mm has {} lamps for {} frames",
+                                     options.nominal->position_in_rig_mm.size(), files.size()),
+                         "give one for each frame, empty where it is not known");
 }
 
-LocatedBall located_by(const BallContour& contour) {
-    LocatedBall ball;
-    ball.circle = contour.circle;
-    ball.contour = contour.points;
-    ball.contour_sigma_px = std::max(contour.spread_px, least_contour_sigma_px);
-    ball.confidence = std::min(1.0, contour.support);
-    ball.rejected = contour.rejected;
-    return ball;
+std::string name_of(std::size_t ball, std::size_t balls) {
+    return balls == 1 ? "the ball" : fmt::format("ball {}", ball + 1);
 }
 
-LocatedBall locate_in_mask(const cv::Mat1b& mask, cv::Size size) {
-    if (mask.size() != size)
-        throw InputError(fmt::format("the ball's mask is {}x{} pixels but the frames are {}x{}", mask.cols, mask.rows,
-                                     size.width, size.height),
-                         "give a mask of the frames' size");
-    return located_by(measure_mask(mask));
+/// The ball on which a highlight was read by hand: the nearest one, and it must show the place.
+std::size_t ball_at(const cv::Point2d& at, const std::string& file, const std::vector<LocatedBall>& balls) {
+    const auto off = [&](const LocatedBall& b) { return std::hypot(at.x - b.ball.x, at.y - b.ball.y); };
+    const auto nearest = std::min_element(balls.begin(), balls.end(), [&](const LocatedBall& a, const LocatedBall& b) {
+        return off(a) - a.ball.radius < off(b) - b.ball.radius;
+    });
+    const Ball& ball = nearest->ball;
+    if (!reflect_at(ball, at.x, at.y))
+        throw InputError(
+            fmt::format("the highlight of {} at ({:.1f}, {:.1f}) lies outside the ball", file, at.x, at.y),
+            fmt::format("the ball is at ({:.1f}, {:.1f}) with radius {:.1f} pixels", ball.x, ball.y, ball.radius));
+    return static_cast<std::size_t>(nearest - balls.begin());
 }
 
-/// A circle given by hand stands; the method `refined` may move it within its uncertainty onto the outline it sees.
-LocatedBall locate_near(const Ball& given, const std::vector<cv::Mat3f>& frames, CalibrationMethod method) {
-    require_inside(given, frames.front().size());
-    const Circle circle{given.x, given.y, given.radius};
-    LocatedBall ball;
-    if (method == CalibrationMethod::refined) {
-        const BallContour contour = measure_contour(mean_over_frames(frames), circle);
-        const double moved = std::hypot(contour.circle.x - circle.x, contour.circle.y - circle.y) +
-                             std::abs(contour.circle.radius - circle.radius);
-        if (contour.support >= least_support && moved < 6 * given_ball_sigma_px) ball = located_by(contour);
+/// What the frames show on every ball, by hand where the user read it.
+std::vector<std::vector<HighlightReading>> read_balls(const std::vector<cv::Mat3f>& frames,
+                                                      const std::vector<std::string>& files,
+                                                      const std::vector<LocatedBall>& balls,
+                                                      const CalibrationOptions& options) {
+    std::vector<std::vector<HighlightReading>> readings;
+    for (const LocatedBall& located : balls)
+        readings.push_back(options.method == CalibrationMethod::refined ? find_highlights(frames, located.ball)
+                                                                        : find_brightest(frames, located.ball));
+    for (const auto& [file, at] : options.highlights)
+        readings[ball_at(at, file, balls)][index_of(file, files)] = {Highlight{at.x, at.y, hand_sigma_px, false}, "",
+                                                                     0};
+    for (const std::string& file : options.drop)
+        for (auto& ball : readings) ball[index_of(file, files)] = {};
+    return readings;
+}
+
+bool shows_anything(const std::vector<HighlightReading>& readings) {
+    return std::any_of(readings.begin(), readings.end(), [](const auto& reading) { return bool(reading.highlight); });
+}
+
+/// Says in words what was not read, and keeps the rest.
+void keep_readings(const std::vector<std::vector<HighlightReading>>& readings, const std::vector<std::string>& files,
+                   Calibration& calibration) {
+    const std::size_t balls = readings.size();
+    for (const auto& ball : readings) {
+        Readings kept;
+        for (const HighlightReading& reading : ball) kept.push_back(reading.highlight);
+        calibration.readings.push_back(std::move(kept));
     }
-    ball.circle = circle;
-    ball.circle_sigma_px = given_ball_sigma_px;
-    ball.confidence = 1;
-    return ball;
-}
-
-LocatedBall locate(const std::vector<cv::Mat3f>& frames, const CalibrationOptions& options) {
-    if (options.ball) return locate_near(*options.ball, frames, options.method);
-    if (options.ball_mask) return locate_in_mask(*options.ball_mask, frames.front().size());
-    const auto found = find_ball(frames);
-    if (!found)
-        throw InputError("no mirror ball was found in the frames",
-                         "say where it is with --ball X,Y,R (pixels), or give --ball-mask");
-    const BallContour contour = measure_contour(mean_over_frames(frames), {found->x, found->y, found->radius});
-    LocatedBall ball = located_by(contour);
-    if (contour.support < least_support) {
-        ball.circle = {found->x, found->y, found->radius};
-        ball.contour.clear();
-        ball.circle_sigma_px = given_ball_sigma_px;
-    }
-    ball.confidence = found->confidence;
-    return ball;
-}
-
-Ball as_ball(const Circle& circle, double confidence) { return {circle.x, circle.y, circle.radius, confidence}; }
-
-/// Reads every frame's highlight, by hand where the user did, and says in words what was left out.
-void read_highlights(const std::vector<cv::Mat3f>& frames, const std::vector<std::string>& files, const Ball& ball,
-                     const CalibrationOptions& options, Calibration& calibration) {
-    auto readings =
-        options.method == CalibrationMethod::refined ? find_highlights(frames, ball) : find_brightest(frames, ball);
-    for (const auto& [file, at] : options.highlights) {
-        if (!reflect_at(ball, at.x, at.y))
-            throw InputError(
-                fmt::format("the highlight of {} at ({:.1f}, {:.1f}) lies outside the ball", file, at.x, at.y),
-                fmt::format("the ball is at ({:.1f}, {:.1f}) with radius {:.1f} pixels", ball.x, ball.y, ball.radius));
-        readings[index_of(file, files)] = {Highlight{at.x, at.y, hand_sigma_px, false}, "", 0};
-    }
-    for (const std::string& file : options.drop) {
-        readings[index_of(file, files)] = {};
-        calibration.rejected.push_back(fmt::format("{}: left out as asked", file));
-    }
+    calibration.highlights.resize(files.size());
     for (std::size_t i = 0; i < files.size(); ++i) {
-        calibration.highlights.push_back(readings[i].highlight);
-        if (!readings[i].reason.empty())
+        for (std::size_t b = 0; b < balls; ++b) {
+            const HighlightReading& reading = readings[b][i];
+            if (!calibration.highlights[i]) calibration.highlights[i] = reading.highlight;
+            if (reading.highlight && reading.other_spots > 0)
+                calibration.rejected.push_back(
+                    fmt::format("{}: {} other bright spots on {}", files[i], reading.other_spots, name_of(b, balls)));
+            if (balls > 1 && !reading.reason.empty())
+                calibration.rejected.push_back(
+                    fmt::format("{}: no highlight on ball {}: {}", files[i], b + 1, reading.reason));
+        }
+        const std::string& reason = readings.front()[i].reason;
+        if (!calibration.highlights[i] && !reason.empty())
             calibration.warnings.push_back(
-                fmt::format("{} has no usable highlight: {}; its light is left out", files[i], readings[i].reason));
-        if (readings[i].highlight && readings[i].other_spots > 0)
-            calibration.rejected.push_back(
-                fmt::format("{}: {} other bright spots on the ball", files[i], readings[i].other_spots));
+                fmt::format("{} has no usable highlight: {}; its light is left out", files[i], reason));
     }
-    if (std::none_of(calibration.highlights.begin(), calibration.highlights.end(),
-                     [](const auto& h) { return bool(h); }))
-        throw InputError("no frame shows a usable highlight on the ball",
-                         "check that the frames show the ball, or say where it is with --ball X,Y,R");
+}
+
+/// A ball that shows no lamp at all is none, unless the user says that it is one.
+void drop_dull_balls(std::vector<LocatedBall>& balls, std::vector<std::vector<HighlightReading>>& readings,
+                     Calibration& calibration) {
+    for (std::size_t b = balls.size(); b-- > 0;) {
+        if (shows_anything(readings[b])) continue;
+        const Ball& ball = balls[b].ball;
+        if (balls.size() == 1)
+            throw InputError("no frame shows a usable highlight on the ball",
+                             "check that the frames show the ball, or say where it is with --ball X,Y,R");
+        calibration.warnings.push_back(fmt::format(
+            "what looks like a ball at ({:.1f}, {:.1f}) of radius {:.1f} shows no highlight; it is left out", ball.x,
+            ball.y, ball.radius));
+        balls.erase(balls.begin() + static_cast<std::ptrdiff_t>(b));
+        readings.erase(readings.begin() + static_cast<std::ptrdiff_t>(b));
+    }
+}
+
+/// The camera as known: given, or its scale told by a ball's diameter; else pixels serve as millimetres.
+struct Scale {
+    ViewGeometry view;
+    bool known = false;
+};
+
+Scale scale_of(const CalibrationOptions& options, const Ball& ball, cv::Size size) {
+    if (options.view) return {*options.view, true};
+    Scale scale;
+    scale.view.principal = {0.5 * (size.width - 1), 0.5 * (size.height - 1)};
+    if (options.ball_diameter_mm) {
+        scale.view.mm_per_pixel = 0.5 * *options.ball_diameter_mm / ball.radius;
+        scale.known = true;
+    }
+    return scale;
+}
+
+/// How far an outline's centre is off because of what the ball mirrors beside its rim. The mirrored direction turns
+/// with the root of the depth below the rim over the radius, so that brightness rises there unlike a blurred step, on
+/// one side of the ball more than on the other; no circle shows it. Measured on rendered balls in unlike rooms
+/// (docs/decisions/0011).
+double outline_bias_px(double radius_px) { return rim_bias_px / std::sqrt(radius_px); }
+
+BallObservations observed(const LocatedBall& located, const Readings& highlights, const Scale& scale,
+                          const CalibrationOptions& options) {
+    BallObservations ball;
+    std::optional<double> radius;
+    if (scale.view.perspective() && options.ball_diameter_mm) radius = 0.5 * *options.ball_diameter_mm;
+    ball.sphere = sphere_of(scale.view, located.ball, radius);
+    if (radius)
+        ball.radius_sigma_mm = ball_size_tolerance * *radius;
+    else if (scale.known)
+        ball.depth_sigma_mm = ball_depth_sigma_mm;
+    ball.contour = located.contour;
+    ball.outline_bias_px = outline_bias_px(located.ball.radius);
+    if (located.sigma_px) {
+        ball.outline = located.ball;
+        ball.outline_sigma_px = *located.sigma_px;
+    }
+    ball.highlights = highlights;
+    return ball;
+}
+
+void warn_of_sizes(const std::vector<MirrorSphere>& spheres, const CalibrationOptions& options,
+                   Calibration& calibration) {
+    if (!options.view || !options.ball_diameter_mm || options.view->perspective()) return;
+    for (const MirrorSphere& sphere : spheres) {
+        const double seen = 2 * sphere.radius_mm, given = *options.ball_diameter_mm;
+        if (std::abs(seen - given) > size_mismatch * given)
+            calibration.warnings.push_back(
+                fmt::format("the ball's outline is {:.2f} mm wide at {:.4f} mm per pixel, but its diameter is given as "
+                            "{:.2f} mm: check both",
+                            seen, options.view->mm_per_pixel, given));
+    }
+}
+
+LampModel lamp_model(const CalibrationOptions& options, const RaysToLamps& rays, const Scale& scale, cv::Size size,
+                     std::size_t balls) {
+    const double field = std::max(size.width, size.height) * scale.view.mm_per_pixel;
+    if (options.lamps == LampModel::automatic)
+        return choose_lamp_model(rays, options.nominal, scale.known ? std::optional(field) : std::nullopt);
+    if (options.lamps == LampModel::near && !scale.known)
+        throw InputError("near lamps have places in millimetres, but the scale of the pictures is not known",
+                         "give the ball's diameter (--ball-diameter MM), or mm_per_pixel in rig.toml");
+    if (options.lamps == LampModel::near && balls < 2 && !options.nominal)
+        throw InputError("one ball tells the directions to near lamps but not their distances",
+                         "put a second ball in view, or describe the lamps' positions in rig.toml");
+    return options.lamps;
+}
+
+void read_directions_off(const RaysToLamps& rays, const std::vector<LocatedBall>& balls, const Scale& scale,
+                         Calibration& calibration) {
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        if (rays[i].empty()) continue;
+        calibration.lights[i].direction = rays[i].front().direction;
+        calibration.lights[i].used = true;
+    }
+    for (const LocatedBall& located : balls) {
+        const MirrorSphere sphere = sphere_of(scale.view, located.ball);
+        calibration.balls.push_back(outline_of(scale.view, sphere, located.ball.confidence));
+        if (!located.contour.empty())
+            calibration.contour_rms_px = std::max(calibration.contour_rms_px, located.contour_spread_px);
+    }
+    calibration.method = "brightest";
+}
+
+void keep_light(const RefinedLight& refined, const Eigen::Vector3d& object, Light& light) {
+    light.direction = refined.direction;
+    light.covariance = refined.covariance;
+    light.used = true;
+    if (refined.position_mm) light.near = LampPosition{*refined.position_mm, object};
+}
+
+void keep_refined(const RefineResult& refined, const RefineInput& input, const std::vector<LocatedBall>& balls,
+                  Calibration& calibration) {
+    for (std::size_t i = 0; i < calibration.lights.size(); ++i)
+        if (refined.lights[i]) keep_light(*refined.lights[i], input.object_mm, calibration.lights[i]);
+    for (std::size_t b = 0; b < refined.balls.size(); ++b) {
+        const RefinedBall& ball = refined.balls[b];
+        calibration.balls.push_back(outline_of(input.view, ball.sphere, balls[b].ball.confidence));
+        calibration.contour_rms_px = std::max(calibration.contour_rms_px, ball.contour_rms_px);
+        if (ball.rejected_points > 0)
+            calibration.rejected.push_back(
+                fmt::format("{} of {} contour points off the outline of {}, by up to {:.2f} px", ball.rejected_points,
+                            input.balls[b].contour.size(), name_of(b, refined.balls.size()), ball.worst_rejected_px));
+    }
+    for (const RejectedHighlight& r : refined.rejected) {
+        const std::string& file = calibration.lights[r.frame].file;
+        calibration.rejected.push_back(
+            fmt::format("{}: its highlight on {} lies {:.2f} px off what the other "
+                        "observations say",
+                        file, name_of(r.ball, refined.balls.size()), r.off_px));
+        if (refined.balls.size() == 2)
+            calibration.warnings.push_back(
+                fmt::format("the two balls disagree about the lamp in {} by {:.2f} px; the highlight on ball {} is "
+                            "left out, which may be the wrong one",
+                            file, r.off_px, r.ball + 1));
+    }
+    calibration.method = "refined";
+}
+
+void refine_lights(const RaysToLamps& rays, RefineInput input, const std::vector<LocatedBall>& balls,
+                   const CalibrationOptions& options, Calibration& calibration) {
+    if (input.lamps == LampModel::near) {
+        FirstPositions first = first_positions(rays, options.nominal);
+        input.start = std::move(first.position_mm);
+        input.distance_known = std::move(first.distance_known);
+        input.nominal = options.nominal;
+    } else {
+        input.start = first_directions(rays);
+        if (options.lamps == LampModel::distant) input.nominal = options.nominal;
+    }
+    const RefineResult refined = refine(input);
+    if (!refined.converged)
+        throw InputError("the ball's outline and the lights could not be refined together",
+                         "check the highlights, or choose the method `brightest`");
+    keep_refined(refined, input, balls, calibration);
+    std::vector<MirrorSphere> spheres;
+    for (const RefinedBall& ball : refined.balls) spheres.push_back(ball.sphere);
+    warn_of_sizes(spheres, options, calibration);
 }
 
 Lights unread_lights(const std::vector<std::string>& files) {
@@ -159,68 +289,42 @@ Lights unread_lights(const std::vector<std::string>& files) {
     return lights;
 }
 
-void read_directions_off(const LocatedBall& located, Calibration& calibration) {
-    const Ball ball = as_ball(located.circle, located.confidence);
-    for (std::size_t i = 0; i < calibration.lights.size(); ++i) {
-        const auto& highlight = calibration.highlights[i];
-        if (!highlight) continue;
-        calibration.lights[i].direction = reflect_at(ball, highlight->u, highlight->v).value();
-        calibration.lights[i].used = true;
-    }
-    calibration.balls = {ball};
-    calibration.contour_rms_px = located.contour.empty() ? 0 : located.contour_sigma_px;
-    calibration.method = "brightest";
-}
-
-void refine_directions(const LocatedBall& located, Calibration& calibration) {
-    const RefineResult refined = refine(
-        {located.circle, located.contour, located.contour_sigma_px, located.circle_sigma_px, calibration.highlights});
-    if (!refined.converged)
-        throw InputError("the ball's circle and the light directions could not be refined together",
-                         "check the highlights, or choose the method `brightest`");
-    for (std::size_t i = 0; i < calibration.lights.size(); ++i) {
-        if (!refined.lights[i]) continue;
-        calibration.lights[i].direction = refined.lights[i]->direction;
-        calibration.lights[i].covariance = refined.lights[i]->covariance;
-        calibration.lights[i].used = true;
-    }
-    calibration.balls = {as_ball(refined.circle, located.confidence)};
-    calibration.contour_rms_px = refined.contour_rms_px;
-    calibration.method = "refined";
-}
-
 }  // namespace
-
-void CalibrationOptions::validate() const {
-    if (ball && !(std::isfinite(ball->x) && std::isfinite(ball->y)))
-        throw InputError(fmt::format("ball.x, ball.y are {}, {}", ball->x, ball->y), "allowed: numbers, in pixels");
-    if (ball && !(std::isfinite(ball->radius) && ball->radius >= 3))
-        throw InputError(fmt::format("ball.radius is {}", ball->radius), "allowed: 3 pixels or more");
-    if (ball && ball_mask)
-        throw InputError("both ball and ball_mask are given", "give one of them: each says where the ball is");
-    for (const auto& [file, at] : highlights)
-        if (!(std::isfinite(at.x) && std::isfinite(at.y)))
-            throw InputError(fmt::format("highlights: {} is at ({}, {})", file, at.x, at.y),
-                             "allowed: numbers, in pixels");
-}
 
 Calibration calibrate(const std::vector<cv::Mat3f>& frames, const std::vector<std::string>& files,
                       const CalibrationOptions& options) {
     options.validate();
     require_frames(frames, files);
-    for (const auto& [file, at] : options.highlights) index_of(file, files);
-    for (const std::string& file : options.drop) index_of(file, files);
+    require_names(options, files);
+    const cv::Size size = frames.front().size();
 
-    const LocatedBall located = locate(frames, options);
     Calibration calibration;
     calibration.lights = unread_lights(files);
-    if (located.rejected > 0)
-        calibration.rejected.push_back(fmt::format("{} points off the ball's outline", located.rejected));
-    read_highlights(frames, files, as_ball(located.circle, located.confidence), options, calibration);
-    if (options.method == CalibrationMethod::refined)
-        refine_directions(located, calibration);
-    else
-        read_directions_off(located, calibration);
+    std::vector<LocatedBall> balls = locate_balls(frames, options);
+    auto readings = read_balls(frames, files, balls, options);
+    for (const std::string& file : options.drop)
+        calibration.rejected.push_back(fmt::format("{}: left out as asked", file));
+    drop_dull_balls(balls, readings, calibration);
+    for (std::size_t b = 0; b < balls.size(); ++b)
+        if (balls[b].rejected > 0)
+            calibration.rejected.push_back(
+                fmt::format("{} readings off the outline of {}", balls[b].rejected, name_of(b, balls.size())));
+    keep_readings(readings, files, calibration);
+
+    const Scale scale = scale_of(options, balls.front().ball, size);
+    if (scale.known) calibration.view = scale.view;
+    RefineInput input;
+    input.view = scale.view;
+    for (std::size_t b = 0; b < balls.size(); ++b)
+        input.balls.push_back(observed(balls[b], calibration.readings[b], scale, options));
+    input.object_mm = scale.view.point_at(options.object.value_or(cv::Point2d(size.width - 1, size.height - 1) * 0.5));
+    const RaysToLamps rays = rays_to_lamps(input.view, input.balls, files.size());
+    if (options.method == CalibrationMethod::brightest) {
+        read_directions_off(rays, balls, scale, calibration);
+    } else {
+        input.lamps = lamp_model(options, rays, scale, size, balls.size());
+        refine_lights(rays, std::move(input), balls, options, calibration);
+    }
     calibration.condition_number = condition_number(calibration.lights);
     for (std::string& warning : warnings_about(calibration)) calibration.warnings.push_back(std::move(warning));
     return calibration;

@@ -127,10 +127,11 @@ Highlight centroid(const cv::Mat1f& image, const Spots& spots, const Spot& spot,
     std::vector<cv::Point> pixels;
     cv::findNonZero(member, pixels);
     Highlight highlight;
-    double sum = 0;
+    double sum = 0, most = 0;
     cv::Point2d moment(0, 0);
     for (const cv::Point& p : pixels) {
         const double weight = std::max(0.0F, std::min(image(p), full_scale) - floor);
+        most = std::max(most, weight);
         highlight.clipped |= image(p) >= full_scale;
         sum += weight;
         moment += weight * cv::Point2d(p);
@@ -138,6 +139,7 @@ Highlight centroid(const cv::Mat1f& image, const Spots& spots, const Spot& spot,
     const cv::Point2d middle = moment / sum;
     double leverage = 0;  // what a unit of noise in every pixel does to the centroid, squared
     for (const cv::Point& p : pixels) leverage += (cv::Point2d(p) - middle).dot(cv::Point2d(p) - middle) / 2;
+    highlight.area_px = sum / most;
     highlight.u = middle.x + zone.box.x;
     highlight.v = middle.y + zone.box.y;
     const double diameter = 2 * std::sqrt(spot.area / CV_PI);

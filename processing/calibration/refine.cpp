@@ -1,123 +1,136 @@
 #include "processing/calibration/refine.h"
 
-#include <ceres/ceres.h>
-#include <ceres/sphere_manifold.h>
 #include <fmt/format.h>
 
-#include <array>
+#include <algorithm>
+#include <cmath>
 
 #include "acquisition/frame/error.h"
+#include "processing/calibration/adjustment.h"
+#include "processing/calibration/reflect.h"
 
 namespace darkbox {
 namespace {
 
-/// A circle's or a direction's believed value.
-struct PriorResidual {
-    std::array<double, 3> value;
-    double sigma;
+constexpr double rejected_sigmas = 4;
+constexpr double least_contour_reject_px = 0.1;
+constexpr double least_highlight_reject_px = 0.5;  ///< nearer than this no highlight is called wrong
+constexpr int most_rounds = 5;
 
-    template <class T>
-    bool operator()(const T* x, T* residual) const {
-        for (std::size_t i = 0; i < 3; ++i) residual[i] = (x[i] - value[i]) / sigma;
-        return true;
+void require_on_balls(const RefineInput& input) {
+    for (const BallObservations& ball : input.balls)
+        for (const auto& h : ball.highlights)
+            if (h && !reflect_at(input.view, ball.sphere, {h->u, h->v}))
+                throw InputError(fmt::format("the highlight at ({:.1f}, {:.1f}) lies outside the ball", h->u, h->v),
+                                 "correct the highlight, or give the ball with --ball X,Y,R");
+}
+
+std::vector<Believed> all_of(const RefineInput& input) {
+    std::vector<Believed> believed;
+    for (const BallObservations& ball : input.balls) {
+        Believed b;
+        b.point.assign(ball.contour.size(), 1);
+        for (const auto& highlight : ball.highlights) b.highlight.push_back(highlight ? 1 : 0);
+        believed.push_back(std::move(b));
     }
-};
-
-/// The parameters in the arrays that Ceres changes, and the problem over them.
-struct Adjustment {
-    std::array<double, 3> circle{};
-    std::vector<std::array<double, 3>> directions;  ///< of the frames with a highlight
-    ceres::Problem problem;
-
-    explicit Adjustment(const RefineInput& input);
-};
-
-std::array<double, 3> first_direction(const Circle& circle, const Highlight& highlight) {
-    const auto light = reflect_at({circle.x, circle.y, circle.radius, 1.0}, highlight.u, highlight.v);
-    if (!light)
-        throw InputError(
-            fmt::format("the highlight at ({:.1f}, {:.1f}) lies outside the ball", highlight.u, highlight.v),
-            "correct the highlight, or give the ball with --ball X,Y,R");
-    return {light->x(), light->y(), light->z()};
+    return believed;
 }
 
-Adjustment::Adjustment(const RefineInput& input) : circle{input.circle.x, input.circle.y, input.circle.radius} {
-    using Contour = ceres::AutoDiffCostFunction<ContourResidual, 1, 3>;
-    using Reflection = ceres::AutoDiffCostFunction<HighlightResidual, 2, 3, 3>;
-    using Prior = ceres::AutoDiffCostFunction<PriorResidual, 3, 3>;
+/// Leaves out the points off the outline, and learns from the others how far one is to be believed.
+void judge_contour(const BallObservations& ball, const std::vector<double>& distances, const Ball& outline,
+                   Believed& believed, RefinedBall& result) {
+    if (ball.contour.empty()) return;
+    const double limit = std::max(least_contour_reject_px, rejected_sigmas * robust_sigma(distances));
+    std::vector<cv::Point2d> points;
+    std::vector<double> kept;
+    result.rejected_points = 0;
+    result.worst_rejected_px = 0;
+    for (std::size_t i = 0; i < distances.size(); ++i) {
+        believed.point[i] = std::abs(distances[i]) <= limit ? 1 : 0;
+        if (believed.point[i]) {
+            points.push_back(ball.contour[i]);
+            kept.push_back(distances[i]);
+        } else {
+            ++result.rejected_points;
+            result.worst_rejected_px = std::max(result.worst_rejected_px, std::abs(distances[i]));
+        }
+    }
+    const ContourNoise noise = contour_noise(points, kept, {outline.x, outline.y});
+    // A centre fitted to n points all around is known to sigma times sqrt(2 / n).
+    const double per_point = std::sqrt(static_cast<double>(points.size()) / 2);
+    believed.contour_sigma_px = std::hypot(noise.effective_sigma_px(), ball.outline_bias_px * per_point);
+    result.contour_rms_px = noise.sigma_px;
+    result.readings_per_independent = noise.readings_per_independent;
+}
 
-    problem.AddParameterBlock(circle.data(), 3);
-    problem.AddResidualBlock(new Prior(new PriorResidual{circle, input.circle_sigma_px}), nullptr, circle.data());
-    for (const cv::Point2d& p : input.contour)
-        problem.AddResidualBlock(new Contour(new ContourResidual{p.x, p.y, input.contour_sigma_px}),
-                                 new ceres::CauchyLoss(2.0), circle.data());
-    directions.reserve(input.highlights.size());  // Ceres keeps addresses
-    for (const auto& highlight : input.highlights) {
-        if (!highlight) continue;
-        directions.push_back(first_direction(input.circle, *highlight));
-        problem.AddParameterBlock(directions.back().data(), 3, new ceres::SphereManifold<3>);
-        problem.AddResidualBlock(new Reflection(new HighlightResidual{highlight->u, highlight->v, highlight->sigma_px}),
-                                 nullptr, circle.data(), directions.back().data());
+/// The worst misfit of each frame at most: when two disagree, leaving out one is all that can be said.
+void judge_highlights(const RefineInput& input, const Adjustment& adjustment, std::vector<Believed>& believed,
+                      std::vector<RejectedHighlight>& rejected) {
+    for (std::size_t frame = 0; frame < input.start.size(); ++frame) {
+        RejectedHighlight worst;
+        double worst_sigmas = 0;
+        for (std::size_t ball = 0; ball < input.balls.size(); ++ball) {
+            const auto off = adjustment.highlight_off_px(ball, frame);
+            if (!off || *off < least_highlight_reject_px) continue;
+            const double sigmas = *off / input.balls[ball].highlights[frame]->sigma_px;
+            if (sigmas > std::max(rejected_sigmas, worst_sigmas)) {
+                worst = {ball, frame, *off};
+                worst_sigmas = sigmas;
+            }
+        }
+        if (worst_sigmas == 0) continue;
+        believed[worst.ball].highlight[frame] = 0;
+        rejected.push_back(worst);
     }
 }
 
-ceres::Solver::Summary solve(Adjustment& adjustment) {
-    ceres::Solver::Options options;
-    options.num_threads = 1;
-    options.linear_solver_type = ceres::DENSE_QR;
-    options.max_num_iterations = 100;
-    options.function_tolerance = 1e-14;
-    options.parameter_tolerance = 1e-12;
-    options.gradient_tolerance = 1e-12;
-    options.logging_type = ceres::SILENT;
-    ceres::Solver::Summary summary;
-    ceres::Solve(options, &adjustment.problem, &summary);
-    return summary;
+RefinedLight near_light(const Eigen::Vector3d& position, const Eigen::Matrix3d& covariance,
+                        const Eigen::Vector3d& object) {
+    RefinedLight light;
+    const double distance = (position - object).norm();
+    light.direction = (position - object) / distance;
+    const Eigen::Matrix3d across =
+        (Eigen::Matrix3d::Identity() - light.direction * light.direction.transpose()) / distance;
+    light.covariance = across * covariance * across.transpose();
+    light.position_mm = position;
+    return light;
 }
 
-/// Of the unit vectors, in the viewer frame, rad^2: rank two each. Zero where it cannot be had.
-std::vector<Eigen::Matrix3d> direction_covariances(Adjustment& adjustment) {
-    ceres::Covariance::Options options;
-    options.num_threads = 1;
-    options.algorithm_type = ceres::DENSE_SVD;
-    options.null_space_rank = -1;
-    ceres::Covariance covariance(options);
-    std::vector<std::pair<const double*, const double*>> blocks;
-    for (const auto& direction : adjustment.directions) blocks.emplace_back(direction.data(), direction.data());
-    std::vector<Eigen::Matrix3d> covariances(adjustment.directions.size(), Eigen::Matrix3d::Zero());
-    if (blocks.empty() || !covariance.Compute(blocks, &adjustment.problem)) return covariances;
-    for (std::size_t i = 0; i < covariances.size(); ++i) {
-        covariance.GetCovarianceBlock(blocks[i].first, blocks[i].second, covariances[i].data());  // symmetric
+std::vector<std::optional<RefinedLight>> lights_of(const RefineInput& input, Adjustment& adjustment) {
+    const std::vector<Eigen::Matrix3d> covariances = adjustment.lamp_covariances();
+    std::vector<std::optional<RefinedLight>> lights(input.start.size());
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+        const auto lamp = adjustment.lamp(i);
+        if (!lamp) continue;
+        lights[i] = input.lamps == LampModel::near ? near_light(*lamp, covariances[i], input.object_mm)
+                                                   : RefinedLight{lamp->normalized(), covariances[i], std::nullopt};
     }
-    return covariances;
-}
-
-double contour_rms(const std::vector<cv::Point2d>& contour, const Circle& circle) {
-    if (contour.empty()) return 0;
-    double squares = 0;
-    for (const cv::Point2d& p : contour) squares += circle.distance(p) * circle.distance(p);
-    return std::sqrt(squares / static_cast<double>(contour.size()));
+    return lights;
 }
 
 }  // namespace
 
 RefineResult refine(const RefineInput& input) {
-    Adjustment adjustment(input);
-    const ceres::Solver::Summary summary = solve(adjustment);
-    const std::vector<Eigen::Matrix3d> covariances = direction_covariances(adjustment);
-
+    require_on_balls(input);
     RefineResult result;
-    result.converged = summary.IsSolutionUsable();
-    result.circle = {adjustment.circle[0], adjustment.circle[1], adjustment.circle[2]};
-    result.contour_rms_px = contour_rms(input.contour, result.circle);
-    std::size_t next = 0;
-    for (const auto& highlight : input.highlights) {
-        result.lights.emplace_back();
-        if (!highlight) continue;
-        const auto& d = adjustment.directions[next];
-        result.lights.back() = RefinedLight{Eigen::Vector3d(d[0], d[1], d[2]).normalized(), covariances[next]};
-        ++next;
+    result.balls.resize(input.balls.size());
+    std::vector<Believed> believed = all_of(input);
+    for (int round = 0; round < most_rounds; ++round) {
+        Adjustment robust(input, believed, Loss::robust);
+        robust.solve();
+        for (std::size_t i = 0; i < input.balls.size(); ++i) {
+            const MirrorSphere sphere = robust.sphere(i);
+            judge_contour(input.balls[i], robust.contour_distances_px(i), outline_of(input.view, sphere), believed[i],
+                          result.balls[i]);
+        }
+        const std::size_t before = result.rejected.size();
+        judge_highlights(input, robust, believed, result.rejected);
+        if (round > 0 && result.rejected.size() == before) break;
     }
+    Adjustment final(input, believed, Loss::squares);
+    result.converged = final.solve();
+    for (std::size_t i = 0; i < input.balls.size(); ++i) result.balls[i].sphere = final.sphere(i);
+    result.lights = lights_of(input, final);
     return result;
 }
 

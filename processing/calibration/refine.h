@@ -1,68 +1,71 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cmath>
+#include <limits>
 #include <optional>
 #include <vector>
 
 #include "processing/calibration/calibration.h"
-#include "processing/calibration/circle_fit.h"
 
 namespace darkbox {
 
-/// What the joint adjustment starts from.
-struct RefineInput {
-    Circle circle;
+/// One ball as measured, and what the joint adjustment starts from.
+struct BallObservations {
+    MirrorSphere sphere;  ///< the start
     std::vector<cv::Point2d> contour;
-    double contour_sigma_px = 0.3;  ///< of one contour point, across the outline
-    double circle_sigma_px = 1e3;   ///< how firmly `circle` itself is believed, in each of x, y and radius
+    double depth_sigma_mm = 1e4;   ///< how firmly the start's z is believed
+    double radius_sigma_mm = 1e4;  ///< and its radius
+    std::optional<Ball> outline;   ///< believed beforehand, such as a circle drawn by hand
+    double outline_sigma_px = 0.5;
+    double outline_bias_px = 0;  ///< standard deviation per axis by which the contour as a whole may be off
     std::vector<std::optional<Highlight>> highlights;  ///< one per frame
+};
+
+struct RefineInput {
+    ViewGeometry view;  ///< of 1 mm per pixel where the scale is not known
+    std::vector<BallObservations> balls;
+    LampModel lamps = LampModel::distant;  ///< distant or near
+    std::vector<Eigen::Vector3d> start;    ///< one per frame: a direction, or a position in mm
+    std::vector<bool> distance_known;      ///< near: one per frame; false: only about what `start` says
+    Eigen::Vector3d object_mm{0, 0, 0};    ///< where a near lamp's direction is to hold
+    std::optional<NominalLamps> nominal;
 };
 
 struct RefinedLight {
     Eigen::Vector3d direction{0, 0, 1};
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< rad^2, rank two
+    std::optional<Eigen::Vector3d> position_mm;            ///< of a near lamp
+};
+
+/// A highlight that does not fit the others.
+struct RejectedHighlight {
+    std::size_t ball = 0;
+    std::size_t frame = 0;
+    double off_px = 0;
+};
+
+/// What became of one ball.
+struct RefinedBall {
+    MirrorSphere sphere;
+    double contour_rms_px = 0;  ///< of the points kept
+    std::size_t rejected_points = 0;
+    double worst_rejected_px = 0;
+    double readings_per_independent = 1;  ///< how many neighbouring contour points say the same
 };
 
 struct RefineResult {
-    Circle circle;
-    std::vector<std::optional<RefinedLight>> lights;  ///< one per frame; none where there was no highlight
-    double contour_rms_px = 0;
+    std::vector<RefinedBall> balls;
+    std::vector<std::optional<RefinedLight>> lights;  ///< one per frame; none where no highlight is left
+    std::vector<RejectedHighlight> rejected;
     bool converged = false;
 };
 
-/// Circle and light directions together (Ceres, one thread): every contour point lies on the circle, every highlight
-/// where its light is mirrored. Contour residuals carry a Cauchy loss. The directions' standard deviations hold the
-/// circle's uncertainty as well as the highlights'.
-/// Throws InputError when a highlight lies off the circle.
+/// Spheres and lights together (Ceres, one thread): every contour point lies on its ball's outline, every highlight
+/// where the ball mirrors its lamp, the lamps about where the rig's description says. First with Cauchy's loss; what
+/// then lies off by more than four standard deviations is left out, the contour's own scatter and the likeness of
+/// neighbouring points are taken from what remains, and plain least squares on that gives values and covariances: they
+/// hold the balls' uncertainty as well as the highlights'.
+/// Throws InputError when a highlight lies off its ball.
 RefineResult refine(const RefineInput& input);
-
-/// Residual of a contour point: its distance to the circle (x, y, radius) over sigma.
-struct ContourResidual {
-    double u, v, sigma_px;
-
-    template <class T>
-    bool operator()(const T* circle, T* residual) const {
-        using std::sqrt;
-        const T dx = u - circle[0], dy = v - circle[1];
-        residual[0] = (sqrt(dx * dx + dy * dy) - circle[2]) / sigma_px;
-        return true;
-    }
-};
-
-/// Residual of a highlight: c + r n_xy - (u, v) over sigma, with n halfway between the light and V = (0, 0, 1).
-struct HighlightResidual {
-    double u, v, sigma_px;
-
-    template <class T>
-    bool operator()(const T* circle, const T* light, T* residual) const {
-        using std::sqrt;
-        const T z = light[2] + 1.0;
-        const T length = sqrt(light[0] * light[0] + light[1] * light[1] + z * z);
-        residual[0] = (circle[0] + circle[2] * light[0] / length - u) / sigma_px;
-        residual[1] = (circle[1] - circle[2] * light[1] / length - v) / sigma_px;  // v runs down, y up
-        return true;
-    }
-};
 
 }  // namespace darkbox

@@ -43,6 +43,15 @@ ViewGeometry view_in(const json& j) {
     return view;
 }
 
+ordered_json highlight_json(const std::optional<Highlight>& highlight) {
+    if (!highlight) return nullptr;
+    return {{"u", highlight->u},
+            {"v", highlight->v},
+            {"sigma_px", highlight->sigma_px},
+            {"clipped", highlight->clipped},
+            {"area_px", highlight->area_px}};
+}
+
 ordered_json light_json(const Light& light, const std::string& lamp, const std::optional<Highlight>& highlight) {
     ordered_json j{{"file", light.file},
                    {"lamp", lamp},
@@ -51,11 +60,7 @@ ordered_json light_json(const Light& light, const std::string& lamp, const std::
                    {"covariance", matrix_json(light.covariance)},
                    {"intensity", triple(light.intensity)},
                    {"used", light.used}};
-    if (highlight)
-        j["highlight"] = {{"u", highlight->u},
-                          {"v", highlight->v},
-                          {"sigma_px", highlight->sigma_px},
-                          {"clipped", highlight->clipped}};
+    if (highlight) j["highlight"] = highlight_json(highlight);
     if (light.near) {
         j["position_mm"] = triple(light.near->position_mm);
         j["object_mm"] = triple(light.near->object_mm);
@@ -75,11 +80,37 @@ Light light_in(const json& j) {
     return light;
 }
 
-std::optional<Highlight> highlight_in(const json& j) {
-    if (!j.contains("highlight")) return std::nullopt;
-    const json& h = j.at("highlight");
+std::optional<Highlight> highlight_in(const json& h) {
+    if (h.is_null()) return std::nullopt;
     return Highlight{h.at("u").get<double>(), h.at("v").get<double>(), h.at("sigma_px").get<double>(),
-                     h.at("clipped").get<bool>()};
+                     h.at("clipped").get<bool>(), h.value("area_px", 0.0)};
+}
+
+/// A perspective camera's ball also has the half axes of its outline.
+ordered_json ball_json(const Ball& ball) {
+    ordered_json j{{"x", ball.x}, {"y", ball.y}, {"radius", ball.radius}, {"confidence", ball.confidence}};
+    if (ball.ellipse)
+        j["ellipse"] = {
+            {"along", ball.ellipse->along}, {"across", ball.ellipse->across}, {"angle_rad", ball.ellipse->angle_rad}};
+    return j;
+}
+Ball ball_in(const json& j) {
+    Ball ball{j.at("x").get<double>(), j.at("y").get<double>(), j.at("radius").get<double>(),
+              j.at("confidence").get<double>()};
+    if (j.contains("ellipse")) {
+        const json& e = j.at("ellipse");
+        ball.ellipse =
+            BallEllipse{e.at("along").get<double>(), e.at("across").get<double>(), e.at("angle_rad").get<double>()};
+    }
+    return ball;
+}
+
+/// Of several balls: what each shows of each light, [light][ball].
+void read_readings(const json& light, Calibration& calibration) {
+    if (!light.contains("highlights")) return;
+    const json& of_balls = light.at("highlights");
+    calibration.readings.resize(of_balls.size());
+    for (std::size_t b = 0; b < of_balls.size(); ++b) calibration.readings[b].push_back(highlight_in(of_balls.at(b)));
 }
 
 StoredCalibration calibration_in(const json& j) {
@@ -87,12 +118,12 @@ StoredCalibration calibration_in(const json& j) {
     Calibration& calibration = stored.calibration;
     for (const json& light : j.at("lights")) {
         calibration.lights.push_back(light_in(light));
-        calibration.highlights.push_back(highlight_in(light));
+        calibration.highlights.push_back(highlight_in(light.value("highlight", json())));
+        read_readings(light, calibration);
         stored.lamps.push_back(light.value("lamp", ""));
     }
-    for (const json& ball : j.at("balls"))
-        calibration.balls.push_back({ball.at("x").get<double>(), ball.at("y").get<double>(),
-                                     ball.at("radius").get<double>(), ball.at("confidence").get<double>()});
+    for (const json& ball : j.at("balls")) calibration.balls.push_back(ball_in(ball));
+    if (calibration.readings.empty()) calibration.readings = {calibration.highlights};
     if (j.contains("view")) calibration.view = view_in(j.at("view"));
     const json& condition = j.at("condition_number");
     calibration.condition_number =
@@ -111,8 +142,10 @@ void write_calibration(const fs::path& path, const Calibration& calibration, con
     for (std::size_t i = 0; i < calibration.lights.size(); ++i)
         lights.push_back(light_json(calibration.lights[i], i < lamps.size() ? lamps[i] : "",
                                     i < calibration.highlights.size() ? calibration.highlights[i] : std::nullopt));
-    for (const Ball& ball : calibration.balls)
-        balls.push_back({{"x", ball.x}, {"y", ball.y}, {"radius", ball.radius}, {"confidence", ball.confidence}});
+    for (const Ball& ball : calibration.balls) balls.push_back(ball_json(ball));
+    if (calibration.readings.size() > 1)
+        for (std::size_t i = 0; i < lights.size(); ++i)
+            for (const auto& ball : calibration.readings) lights[i]["highlights"].push_back(highlight_json(ball[i]));
     ordered_json j{{"frame", "viewer: x right, y up, z from the object to the camera; pixels: u right, v down"},
                    {"method", calibration.method},
                    {"condition_number", calibration.condition_number},  // infinity becomes null

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include "processing/formats/srgb.h"
@@ -48,14 +49,17 @@ BallView view_of_balls(const std::vector<cv::Mat3f>& frames, const std::vector<B
 
 cv::Mat3b draw_balls(const BallView& view, const Calibration& calibration) {
     cv::Mat3b drawn = view.image.clone();
-    for (const Ball& ball : calibration.balls)
-        cv::circle(drawn, fixed_point(view.in_view(ball.x, ball.y)),
-                   static_cast<int>(std::lround(ball.radius * view.scale * (1 << sub_pixel_bits))), outline_colour, 1,
-                   cv::LINE_AA, sub_pixel_bits);
-    for (const auto& highlight : calibration.highlights)
-        if (highlight)
-            cv::drawMarker(drawn, view.in_view(highlight->u, highlight->v), highlight_colour, cv::MARKER_CROSS, 13, 1,
-                           cv::LINE_AA);
+    for (const Ball& ball : calibration.balls) {
+        const BallEllipse axes = ball.ellipse.value_or(BallEllipse{ball.radius, ball.radius, 0});
+        const cv::Point half = fixed_point({axes.along * view.scale, axes.across * view.scale});
+        cv::ellipse(drawn, fixed_point(view.in_view(ball.x, ball.y)), {half.x, half.y},
+                    axes.angle_rad * 180 / std::numbers::pi, 0, 360, outline_colour, 1, cv::LINE_AA, sub_pixel_bits);
+    }
+    for (const auto& ball : calibration.readings)
+        for (const auto& highlight : ball)
+            if (highlight)
+                cv::drawMarker(drawn, view.in_view(highlight->u, highlight->v), highlight_colour, cv::MARKER_CROSS, 13,
+                               1, cv::LINE_AA);
     return drawn;
 }
 

@@ -14,6 +14,7 @@
 #include "processing/pipeline/ball_picture.h"
 #include "processing/pipeline/given_lights.h"
 #include "processing/pipeline/session_files.h"
+#include "processing/pipeline/session_geometry.h"
 #include "processing/pipeline/stack.h"
 #include "processing/pipeline/stages.h"
 #include "processing/pipeline/steps.h"
@@ -61,23 +62,34 @@ Calibration from_stored(const fs::path& from, const std::vector<FrameRecord>& li
         calibration.lights.back().file = basename_of(lit[i]);
     }
     calibration.highlights.resize(lit.size());
+    calibration.view = stored.calibration.view;
     calibration.condition_number = condition_number(calibration.lights);
     calibration.method = "stored: " + file.string();
     return calibration;
 }
 
-Ball read_ball(const fs::path& path) {
+/// A list of balls, or one alone.
+std::vector<Ball> read_balls(const fs::path& path) {
     const auto json = read_json(path);
     return reading_keys(path, "a ball", [&] {
-        return Ball{json.at("x").get<double>(), json.at("y").get<double>(), json.at("radius").get<double>(), 1.0};
+        const auto ball_in = [](const auto& j) {
+            return Ball{j.at("x").template get<double>(), j.at("y").template get<double>(),
+                        j.at("radius").template get<double>(), 1.0};
+        };
+        std::vector<Ball> balls;
+        if (!json.contains("balls")) return std::vector<Ball>{ball_in(json)};
+        for (const auto& ball : json.at("balls")) balls.push_back(ball_in(ball));
+        return balls;
     });
 }
 
 /// What was given at import holds unless the command says otherwise.
-CalibrationOptions with_imported(const Session& session, CalibrationOptions options) {
-    if (options.ball || options.ball_mask) return options;
+CalibrationOptions with_imported(const Session& session, const CalibrateOptions& asked) {
+    CalibrationOptions options = asked.calibration;
+    if (asked.ball_mask) options.ball_mask = read_mask(*asked.ball_mask);
+    if (!options.balls.empty() || options.ball_mask) return options;
     if (const auto ball = extra_of(session, given_ball))
-        options.ball = read_ball(*ball);
+        options.balls = read_balls(*ball);
     else if (const auto mask = extra_of(session, ball_mask))
         options.ball_mask = read_mask(*mask);
     return options;
@@ -135,7 +147,7 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
     const std::vector<FrameRecord> lit = frames_of_kind(session, FrameKind::lit);
     CalibrateSummary summary;
     Stopwatch watch;
-    const bool ball_asked_for = options.calibration.ball || options.calibration.ball_mask;
+    const bool ball_asked_for = !options.calibration.balls.empty() || options.ball_mask;
     const auto given = options.from || ball_asked_for ? std::nullopt : given_lights(session);
     if (options.from) {
         summary.calibration = from_stored(*options.from, lit);
@@ -145,7 +157,9 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
         const BallFrames ball = load_ball_frames(session, work);
         summary.seconds.read = watch.lap();
         step(work, {"calibrating lights", 0, 1, "ball and highlights"});
-        summary.calibration = calibrate(ball.frames, ball.files, with_imported(session, options.calibration));
+        const CalibrationOptions wanted =
+            with_geometry(session, with_imported(session, options), ball.frames.front().size());
+        summary.calibration = calibrate(ball.frames, ball.files, wanted);
         require_highlights(summary.calibration, options.calibration.drop);
         summary.seconds.solve = watch.lap();
         const BallView view = view_of_balls(ball.frames, summary.calibration.balls);

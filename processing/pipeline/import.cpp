@@ -136,7 +136,9 @@ Extra mask_extra(const fs::path& path, const char* name, const Inspected& first)
     return {name, std::move(bytes)};
 }
 
-bool ball_is_given(const ImportOptions& options) { return options.ball_images || options.ball || options.ball_mask; }
+bool ball_is_given(const ImportOptions& options) {
+    return options.ball_images || !options.balls.empty() || options.ball_mask;
+}
 
 /// Light files to keep: those asked for, else those in the folder, unless a ball is to tell the lights.
 std::vector<Extra> light_extras(const Survey& survey, const ImportOptions& options, const std::vector<Inspected>& lit) {
@@ -152,8 +154,10 @@ std::vector<Extra> light_extras(const Survey& survey, const ImportOptions& optio
     return extras;
 }
 
-Extra ball_extra(const Ball& ball) {
-    const std::string text = nlohmann::json{{"x", ball.x}, {"y", ball.y}, {"radius", ball.radius}}.dump(2) + "\n";
+Extra balls_extra(const std::vector<Ball>& balls) {
+    nlohmann::json list = nlohmann::json::array();
+    for (const Ball& ball : balls) list.push_back({{"x", ball.x}, {"y", ball.y}, {"radius", ball.radius}});
+    const std::string text = nlohmann::json{{"balls", list}}.dump(2) + "\n";
     const auto bytes = std::as_bytes(std::span(text));
     return {given_ball, {bytes.begin(), bytes.end()}};
 }
@@ -166,7 +170,7 @@ struct Findings {
 
 /// A circle given by hand outranks a mask that merely lies there.
 std::optional<fs::path> ball_mask_of(const Findings& found, const ImportOptions& options) {
-    if (options.ball && !options.ball_mask) return std::nullopt;
+    if (!options.balls.empty() && !options.ball_mask) return std::nullopt;
     return mask_of(found.ball, options.ball_mask, "--ball-mask");
 }
 
@@ -176,7 +180,7 @@ std::vector<Extra> extras_of(const Findings& found, const ImportOptions& options
     if (const auto mask = mask_of(found.object, options.mask, "--mask"))
         extras.push_back(mask_extra(*mask, object_mask, found.lit.front()));
     if (const auto mask = ball_mask_of(found, options)) extras.push_back(mask_extra(*mask, ball_mask, ball));
-    if (options.ball) extras.push_back(ball_extra(*options.ball));
+    if (!options.balls.empty()) extras.push_back(balls_extra(options.balls));
     if (found.object.truth) extras.push_back({given_truth, read_file(*found.object.truth)});
     return extras;
 }
@@ -234,12 +238,13 @@ std::string name_of_folder(const fs::path& folder) {
 void ImportOptions::validate() const {
     if (folders.empty()) throw InputError("folders is empty: nothing to import", "give a folder of photographs");
     if (out.empty()) throw InputError("out is empty: nowhere to write the session", "say where with --out");
-    const bool sane =
-        !ball || (std::isfinite(ball->x) && std::isfinite(ball->y) && ball->radius > 0 && std::isfinite(ball->radius));
-    if (!sane)
-        throw InputError(fmt::format("ball is {}, {}, {}: x and y must be finite and the radius above 0 pixels",
-                                     ball->x, ball->y, ball->radius),
-                         "give the ball as X,Y,R in pixels");
+    for (const Ball& ball : balls)
+        if (!(std::isfinite(ball.x) && std::isfinite(ball.y) && ball.radius > 0 && std::isfinite(ball.radius)))
+            throw InputError(fmt::format("ball is {}, {}, {}: x and y must be finite and the radius above 0 pixels",
+                                         ball.x, ball.y, ball.radius),
+                             "give the ball as X,Y,R in pixels");
+    if (ball_diameter_mm && !(std::isfinite(*ball_diameter_mm) && *ball_diameter_mm > 0))
+        throw InputError(fmt::format("ball_diameter_mm is {}", *ball_diameter_mm), "allowed: more than 0 mm");
 }
 
 Session import_photographs(const ImportOptions& options, const WorkContext& work) {
@@ -260,6 +265,10 @@ Session import_photographs(const ImportOptions& options, const WorkContext& work
     info.source = "import";
     info.planned_shots = static_cast<int>(all.size());
     info.notes = notes_of(found, options, extras);
+    if (options.ball_diameter_mm) {
+        info.geometry.emplace();
+        info.geometry->ball_diameter_mm = options.ball_diameter_mm;
+    }
     const bool was_there = fs::exists(options.out);
     try {
         return write_session(info, options.out, all, extras, work);

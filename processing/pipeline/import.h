@@ -27,7 +27,8 @@ struct ImportOptions {
     std::vector<std::filesystem::path> folders;        ///< one object's photographs, in the order given
     std::filesystem::path out;                         ///< the session's folder, absent or empty
     std::optional<std::filesystem::path> ball_images;  ///< a ball in the object's place under the same lamps
-    std::optional<Ball> ball;                          ///< pixels
+    std::vector<Ball> balls;                           ///< pixels
+    std::optional<double> ball_diameter_mm;            ///< of every ball; tells the scale
     std::optional<std::filesystem::path> ball_mask;    ///< 255 on the ball
     std::optional<std::filesystem::path> mask;         ///< 255 on the object
     std::optional<std::filesystem::path> lights;       ///< any form that read_lights() knows

@@ -1,5 +1,7 @@
 #include "processing/pipeline/summary_json.h"
 
+#include <numbers>
+
 namespace darkbox {
 namespace {
 
@@ -11,18 +13,32 @@ ordered_json seconds_json(const StageSeconds& seconds) {
 
 ordered_json triple(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
 
+ordered_json light_json(const Light& light) {
+    ordered_json json{{"file", light.file},
+                      {"direction", triple(light.direction)},
+                      {"sigma_deg", light.sigma_deg()},
+                      {"intensity", triple(light.intensity)},
+                      {"used", light.used}};
+    if (light.near) json["position_mm"] = triple(light.near->position_mm);
+    return json;
+}
+
+ordered_json ball_json(const Ball& ball) {
+    ordered_json json{{"x", ball.x}, {"y", ball.y}, {"radius", ball.radius}};
+    if (ball.ellipse)
+        json["ellipse"] = {{"along", ball.ellipse->along},
+                           {"across", ball.ellipse->across},
+                           {"angle_deg", ball.ellipse->angle_rad * 180 / std::numbers::pi}};
+    return json;
+}
+
 }  // namespace
 
 ordered_json to_json(const CalibrateSummary& summary) {
     const Calibration& calibration = summary.calibration;
     ordered_json lights = ordered_json::array(), balls = ordered_json::array();
-    for (const Light& light : calibration.lights)
-        lights.push_back({{"file", light.file},
-                          {"direction", triple(light.direction)},
-                          {"sigma_deg", light.sigma_deg()},
-                          {"intensity", triple(light.intensity)},
-                          {"used", light.used}});
-    for (const Ball& ball : calibration.balls) balls.push_back({{"x", ball.x}, {"y", ball.y}, {"radius", ball.radius}});
+    for (const Light& light : calibration.lights) lights.push_back(light_json(light));
+    for (const Ball& ball : calibration.balls) balls.push_back(ball_json(ball));
     return {{"method", calibration.method},
             {"lights", lights},
             {"balls", balls},

@@ -84,6 +84,17 @@ Begun resume(const CaptureRequest& request, const RigDescription& rig) {
 
 }  // namespace
 
+CaptureGeometry geometry_of(const RigDescription& rig) {
+    CaptureGeometry geometry;
+    geometry.mm_per_pixel = rig.camera.mm_per_pixel;
+    geometry.camera_distance_mm = rig.camera.distance_mm;
+    geometry.principal_px = rig.camera.principal_px;
+    geometry.ball_diameter_mm = rig.ball_diameter_mm;
+    geometry.distant_lamps = rig.distant_lamps;
+    for (const LampDescription& lamp : rig.lamps) geometry.lamps.push_back({lamp.name, lamp.position_mm});
+    return geometry;
+}
+
 SessionInfo session_info(const RigDescription& rig, const CameraInfo& camera, const std::string& object,
                          const CapturePlan& plan) {
     SessionInfo info;
@@ -93,6 +104,7 @@ SessionInfo session_info(const RigDescription& rig, const CameraInfo& camera, co
     info.rig = rig.name;
     info.camera = camera.id.empty() ? camera.model : fmt::format("{} ({})", camera.model, camera.id);
     info.planned_shots = static_cast<int>(plan.shots.size());
+    info.geometry = geometry_of(rig);
     info.notes.push_back(lamps_note + fmt::format("{}", fmt::join(lamps_of(plan, rig), " ")));
     return info;
 }

@@ -25,6 +25,9 @@ struct CapturedSession {
     CaptureSummary summary;
 };
 
+/// What the rig's description knows of the geometry, for the session.
+CaptureGeometry geometry_of(const RigDescription& rig);
+
 /// The head of a session of this plan, created now.
 SessionInfo session_info(const RigDescription& rig, const CameraInfo& camera, const std::string& object,
                          const CapturePlan& plan);

@@ -13,12 +13,12 @@ constexpr std::string_view warning_prefix = "warning: ";
 
 struct Arguments {
     ImportOptions options;
-    std::string ball;
+    std::vector<std::string> balls;
 };
 
 CommandResult run(const Arguments& arguments, const WorkContext& work) {
     ImportOptions options = arguments.options;
-    if (!arguments.ball.empty()) options.ball = parse_ball(arguments.ball);
+    for (const std::string& text : arguments.balls) options.balls.push_back(parse_ball(text));
     const Session session = import_photographs(options, work);
 
     CommandResult result;
@@ -52,7 +52,8 @@ void add_import_command(CommandLine& line) {
     command.add_option("--out", a->options.out, "Folder of the new session")->required();
     command.add_option("--object", a->options.object, "Name of the object; default: the first folder's name");
     command.add_option("--ball-images", a->options.ball_images, "Folder with a mirror ball under the same lamps");
-    command.add_option("--ball", a->ball, "The ball's outline, pixels: X,Y,R");
+    command.add_option("--ball", a->balls, "A ball's outline, pixels: X,Y,R; once for each ball");
+    command.add_option("--ball-diameter", a->options.ball_diameter_mm, "Of the mirror balls, mm: tells the scale");
     command.add_option("--ball-mask", a->options.ball_mask, "Picture that is white on the ball");
     command.add_option("--mask", a->options.mask, "Picture that is white on the object");
     command.add_option("--lights", a->options.lights, "Light directions: .lp, counted or bare x y z lines");

@@ -13,7 +13,8 @@ namespace {
 struct Arguments {
     std::filesystem::path session;
     ProcessOptions options;
-    std::string ball;
+    std::vector<std::string> balls;
+    std::filesystem::path ball_mask;
     std::filesystem::path from;
     std::vector<std::string> highlights;
 };
@@ -22,7 +23,8 @@ struct Arguments {
 ProcessOptions options_of(const Arguments& arguments) {
     ProcessOptions options = arguments.options;
     CalibrationOptions& calibration = options.calibrate.calibration;
-    if (!arguments.ball.empty()) calibration.ball = parse_ball(arguments.ball);
+    for (const std::string& text : arguments.balls) calibration.balls.push_back(parse_ball(text));
+    if (!arguments.ball_mask.empty()) options.calibrate.ball_mask = arguments.ball_mask;
     if (!arguments.from.empty()) options.calibrate.from = arguments.from;
     for (const std::string& text : arguments.highlights) calibration.highlights.push_back(parse_highlight(text));
     return options;
@@ -33,6 +35,8 @@ std::string describe(const CalibrateSummary& summary) {
     const auto used = std::count_if(c.lights.begin(), c.lights.end(), [](const Light& light) { return light.used; });
     std::string text = fmt::format("{} of {} lights read ({}), condition number {:.2f}", used, c.lights.size(),
                                    c.method, c.condition_number);
+    const auto near = std::count_if(c.lights.begin(), c.lights.end(), [](const Light& light) { return light.near; });
+    if (near > 0) text += fmt::format("\n{} lamps are near: their places are known in mm", near);
     for (const Ball& ball : c.balls)
         text += fmt::format("\nball at ({:.1f}, {:.1f}), radius {:.1f} px", ball.x, ball.y, ball.radius);
     return text;
@@ -88,7 +92,13 @@ CommandResult result_of(const ProcessSummary& summary) {
 
 void add_calibrate_options(CLI::App& command, Arguments& a) {
     CalibrationOptions& calibration = a.options.calibrate.calibration;
-    command.add_option("--ball", a.ball, "The ball's outline, pixels: X,Y,R (else it is found)");
+    command.add_option("--ball", a.balls, "A ball's outline, pixels: X,Y,R; once for each ball (else they are found)");
+    command.add_option("--ball-mask", a.ball_mask, "Picture that is white on the ball or balls");
+    command.add_option("--ball-diameter", calibration.ball_diameter_mm, "Of the mirror balls, mm: tells the scale");
+    const std::map<std::string, LampModel> models{
+        {"auto", LampModel::automatic}, {"distant", LampModel::distant}, {"near", LampModel::near}};
+    command.add_option("--lamps", calibration.lamps, "near: lamps have places; distant: directions; auto: as known")
+        ->transform(CLI::CheckedTransformer(models).description("{auto,distant,near}"));
     command.add_option("--drop", calibration.drop, "Frames to leave out");
     command.add_option("--highlight", a.highlights, "A highlight read by hand: FRAME=X,Y");
     command.add_option("--from", a.from, "Reuse the lights of this lights.json or session");

@@ -20,6 +20,8 @@ constexpr std::size_t most_lamps = 64;
 constexpr std::size_t longest_name = 64;
 constexpr double nearest_lamp_mm = 10;
 constexpr double farthest_lamp_mm = 100'000;
+constexpr double farthest_principal_px = 100'000;
+constexpr double intrinsics_agree_within = 0.01;
 
 Seconds milliseconds(double ms) { return Seconds(ms / 1000.0); }
 double as_milliseconds(Seconds s) { return s.count() * 1000.0; }
@@ -90,6 +92,11 @@ LampDescription read_lamp(TomlSection& section, const std::string& driver, Secon
     return lamp;
 }
 
+/// A scene's name is words joined by '-'.
+bool has_word(const std::string& scene, const std::string& word) {
+    return ("-" + scene + "-").find("-" + word + "-") != std::string::npos;
+}
+
 /// `output` is what two lamps may not share, such as their name.
 template <typename Output>
 void refuse_duplicate(const std::vector<LampDescription>& lamps, Output output, const TomlSection& section,
@@ -104,8 +111,10 @@ void refuse_duplicate(const std::vector<LampDescription>& lamps, Output output, 
 }
 
 void read_lamps(TomlSection& section, RigDescription& rig) {
-    section.allow({"driver", "lamp"});
+    section.allow({"driver", "distant", "lamp"});
     rig.lamps_driver = section.choice("driver", rig.lamps_driver, {"gpio", "usb", "sim"});
+    const bool simulated_distant = rig.lamps_driver == "sim" && !has_word(rig.sim.scene, "near");
+    rig.distant_lamps = section.flag("distant").value_or(simulated_distant);
     std::vector<TomlSection> lamps = section.sections("lamp", "[[lamps.lamp]]");
     if (lamps.empty()) section.fail("lamp", "holds no lamp; allowed: 1 to 64", "add a [[lamps.lamp]] for each lamp");
     for (TomlSection& lamp : lamps) {
@@ -121,6 +130,42 @@ void read_lamps(TomlSection& section, RigDescription& rig) {
     }
 }
 
+/// Two of scale, distance and focal length tell the third: distance = focal length times scale.
+void read_intrinsics(TomlSection& section, CameraDescription& camera) {
+    section.allow({"mm_per_pixel", "distance_mm", "focal_length_px", "principal_px"});
+    camera.mm_per_pixel = section.number("mm_per_pixel", {0.0001, 100});
+    camera.distance_mm = section.number("distance_mm", {1, 1'000'000});
+    const auto focal_length = section.number("focal_length_px", {1, 10'000'000});
+    if (const auto point = section.numbers("principal_px", 2)) {
+        camera.principal_px = {(*point)[0], (*point)[1]};
+        for (const double coordinate : *point)
+            if (std::abs(coordinate) > farthest_principal_px)
+                section.fail("principal_px",
+                             fmt::format("principal_px has {}; allowed: {} to {}", coordinate, -farthest_principal_px,
+                                         farthest_principal_px),
+                             "give the pixel at which the optical axis meets the picture: u right, v down");
+    }
+    if (camera.distance_mm && !camera.mm_per_pixel && !focal_length)
+        section.fail("distance_mm", "distance_mm needs mm_per_pixel or focal_length_px beside it",
+                     "add the scale at the object");
+    if (!focal_length) return;
+    if (camera.distance_mm && camera.mm_per_pixel) {
+        const double told = *focal_length * *camera.mm_per_pixel;
+        if (std::abs(told - *camera.distance_mm) > intrinsics_agree_within * *camera.distance_mm)
+            section.fail("focal_length_px",
+                         fmt::format("focal_length_px times mm_per_pixel is {:.1f} mm, but distance_mm is {:.1f}", told,
+                                     *camera.distance_mm),
+                         "give two of the three, or values that agree");
+    } else if (camera.mm_per_pixel) {
+        camera.distance_mm = *focal_length * *camera.mm_per_pixel;
+    } else if (camera.distance_mm) {
+        camera.mm_per_pixel = *camera.distance_mm / *focal_length;
+    } else {
+        section.fail("focal_length_px", "focal_length_px needs mm_per_pixel or distance_mm beside it",
+                     "add the scale at the object, or the camera's distance from it");
+    }
+}
+
 CameraDescription read_camera(TomlSection& section) {
     CameraDescription camera;
     section.allow({"driver", "device", "exposure_ms", "gain", "intrinsics"});
@@ -129,10 +174,7 @@ CameraDescription read_camera(TomlSection& section) {
     camera.exposure =
         milliseconds(section.number("exposure_ms", {0.001, 60'000}).value_or(as_milliseconds(camera.exposure)));
     camera.gain = section.number("gain", {0.001, 1000}).value_or(camera.gain);
-    if (auto intrinsics = section.section("intrinsics", "[camera.intrinsics]")) {
-        intrinsics->allow({"mm_per_pixel"});
-        camera.mm_per_pixel = intrinsics->number("mm_per_pixel", {0.0001, 100});
-    }
+    if (auto intrinsics = section.section("intrinsics", "[camera.intrinsics]")) read_intrinsics(*intrinsics, camera);
     if (camera.driver == "v4l2" && camera.device.empty())
         section.fail("device", "device is missing; driver \"v4l2\" needs it",
                      "add device = \"/dev/v4l/by-id/...\" (ls /dev/v4l/by-id)");
@@ -178,6 +220,14 @@ void read_api(TomlSection& section, RigDescription& rig) {
     rig.socket = section.text("socket").value_or("");
 }
 
+/// The simulator draws from where the description says that the camera is, and the description of a perspective scene
+/// tells the simulator's own place where it says nothing.
+void settle_simulated_camera(RigDescription& rig) {
+    if (rig.camera.driver != "sim") return;
+    rig.sim.camera_distance_mm = rig.camera.distance_mm.value_or(rig.sim.camera_distance_mm);
+    if (has_word(rig.sim.scene, "perspective")) rig.camera.distance_mm = rig.sim.camera_distance_mm;
+}
+
 RigDescription read_rig(TomlSection& root) {
     root.allow({"rig", "camera", "lamps", "ball", "capture", "processing", "api", "sim"}, "section");
     RigDescription rig;
@@ -197,6 +247,7 @@ RigDescription read_rig(TomlSection& root) {
     if (auto section = root.section("processing", "[processing]")) section->allow({});
     if (auto section = root.section("api", "[api]")) read_api(*section, rig);
     if (auto section = root.section("sim", "[sim]")) rig.sim = read_sim(*section);
+    settle_simulated_camera(rig);
     if (!lamps) root.fail("lamps", "has no [lamps]", "add [lamps] with a [[lamps.lamp]] for each lamp");
     read_lamps(*lamps, rig);
     if ((rig.camera.driver == "sim") != (rig.lamps_driver == "sim"))

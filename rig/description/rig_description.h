@@ -26,7 +26,9 @@ struct CameraDescription {
     std::string device;          ///< v4l2: stable id or path
     Seconds exposure{0.02};
     double gain = 1.0;
-    std::optional<double> mm_per_pixel;  ///< [camera.intrinsics], at the object
+    std::optional<double> mm_per_pixel;                 ///< [camera.intrinsics], at the object
+    std::optional<double> distance_mm;                  ///< from the object; none: orthographic
+    std::optional<std::array<double, 2>> principal_px;  ///< none: the picture's centre
 };
 
 struct CaptureDescription {
@@ -39,8 +41,9 @@ struct CaptureDescription {
 /// Options of the simulated rig; see sim/ for the scenes.
 struct SimDescription {
     std::string scene = "brick-torus";
-    int width = 320;   ///< pixels
-    int height = 240;  ///< pixels
+    int width = 320;                  ///< pixels
+    int height = 240;                 ///< pixels
+    double camera_distance_mm = 800;  ///< [camera.intrinsics] distance_mm; of perspective scenes
     int bit_depth = 12;
     double full_well_e = 20000;  ///< electrons at full scale
     double read_noise_e = 5;     ///< electrons, standard deviation
@@ -56,6 +59,7 @@ struct RigDescription {
     CameraDescription camera;
     std::string lamps_driver = "sim";  ///< "gpio", "usb" or "sim"
     std::vector<LampDescription> lamps;
+    bool distant_lamps = false;  ///< their light is parallel: behind collimators, or simulated so
     std::optional<double> ball_diameter_mm;
     CaptureDescription capture;
     SimDescription sim;

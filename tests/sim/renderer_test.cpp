@@ -190,7 +190,7 @@ TEST(Renderer, PhongAddsAHighlightInTheMirrorDirection) {
 
 /// Centroid of the ball's highlight by its radiance.
 Vec2 highlight_centroid(const Scene& scene, const RgbImage& image) {
-    const BallCircle ball = ball_circle(scene.view, scene.ball->sphere);
+    const BallCircle ball = ball_circle(scene.view, scene.balls.front().sphere);
     double weight = 0.0, u_sum = 0.0, v_sum = 0.0;
     for (int v = 0; v < scene.view.height; ++v)
         for (int u = 0; u < scene.view.width; ++u) {
@@ -207,7 +207,8 @@ TEST(Renderer, BallHighlightLiesAtTheHalfVector) {
     for (std::uint32_t i = 0; i < directions.size(); ++i) {
         const auto& d = directions[i];
         const Vec3 half = unit(unit({d[0], d[1], d[2]}) + Vec3{0, 0, 1});
-        const Vec2 expected = project(scene.view, scene.ball->sphere.centre + half * scene.ball->sphere.radius_mm);
+        const Vec2 expected =
+            project(scene.view, scene.balls.front().sphere.centre + half * scene.balls.front().sphere.radius_mm);
         const Vec2 found = highlight_centroid(scene, render_radiance(scene, LampId{i}));
         EXPECT_NEAR(found.u, expected.u, 0.1) << i;
         EXPECT_NEAR(found.v, expected.v, 0.1) << i;
@@ -216,7 +217,7 @@ TEST(Renderer, BallHighlightLiesAtTheHalfVector) {
 
 TEST(Renderer, NearLampIsMirroredWhereItStands) {
     const Scene scene = scene_of("sphere-lambert-near", 320, lamps_at({{0.6, 0.3, 0.8}}));
-    const Sphere& ball = scene.ball->sphere;
+    const Sphere& ball = scene.balls.front().sphere;
     Vec3 on_ball = ball.centre;
     for (int i = 0; i < 20; ++i)
         on_ball = ball.centre + unit(unit(scene.lamps[0].position - on_ball) + Vec3{0, 0, 1}) * ball.radius_mm;
@@ -233,7 +234,7 @@ TEST(Renderer, HighlightClipsAndTheBallMirrorsTheObjectDimly) {
     alone.object.clear();
     const RgbImage with = render_radiance(scene, LampId{0});
     const RgbImage without = render_radiance(alone, LampId{0});
-    const BallCircle ball = ball_circle(scene.view, scene.ball->sphere);
+    const BallCircle ball = ball_circle(scene.view, scene.balls.front().sphere);
     EXPECT_NEAR(ball.radius, 28.8, 1e-9);
     float brightest = 0.0F, reflected = 0.0F;
     for (int v = 0; v < 240; ++v)

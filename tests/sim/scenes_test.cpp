@@ -40,7 +40,7 @@ TEST(Scenes, BallStaysInViewApartFromTheObject) {
         for (const int width : {64, 320}) {
             const Scene scene = scene_of(shape + "-lambert", width, lamps_at({{0, 0, 1}}));
             const SceneTruth truth = render_truth(scene);
-            const BallCircle ball = ball_circle(scene.view, scene.ball->sphere);
+            const BallCircle ball = ball_circle(scene.view, scene.balls.front().sphere);
             EXPECT_GE(ball.centre.u - ball.radius, 0.0);
             EXPECT_LE(ball.centre.v + ball.radius, scene.view.height - 1.0);
             EXPECT_GE(ball.radius, 24.0 * width / 320);
@@ -52,6 +52,28 @@ TEST(Scenes, BallStaysInViewApartFromTheObject) {
         }
 }
 
+TEST(Scenes, SeveralBallsStandApartAndInView) {
+    for (const std::string shape : {"sphere", "torus", "teapot", "relief"}) {
+        EXPECT_EQ(scene_of(shape + "-twoballs", 320, lamps_at({{0, 0, 1}})).balls.size(), 2U);
+        const Scene scene = scene_of(shape + "-perspective-threeballs", 96, lamps_at({{0, 0, 1}}));
+        ASSERT_EQ(scene.balls.size(), 3U);
+        const SceneTruth truth = render_truth(scene);
+        for (std::size_t i = 0; i < 3; ++i) {
+            const BallCircle ball = ball_circle(scene.view, scene.balls[i].sphere);
+            EXPECT_GE(ball.centre.u - ball.radius, 0.0);
+            EXPECT_GE(ball.centre.v - ball.radius, 0.0);
+            EXPECT_LE(ball.centre.v + ball.radius, scene.view.height - 1.0);
+            for (std::size_t j = 0; j < i; ++j)
+                EXPECT_GT(length(scene.balls[i].sphere.centre - scene.balls[j].sphere.centre), 36.0);
+            for (int v = 0; v < scene.view.height; ++v)
+                for (int u = 0; u < scene.view.width; ++u)
+                    if (truth.mask[static_cast<std::size_t>(v * scene.view.width + u)] != 0) {
+                        ASSERT_GT(std::hypot(u - ball.centre.u, v - ball.centre.v), ball.radius) << shape;
+                    }
+        }
+    }
+}
+
 TEST(Scenes, EveryLampShowsItsHighlightAndNoShadowOfTheBallFallsOnTheObject) {
     const RigDescription rig = parse_rig(simulated_rig_toml(12), "simulated rig");
     for (const std::string shape : {"sphere", "torus", "teapot", "relief"}) {
@@ -61,8 +83,8 @@ TEST(Scenes, EveryLampShowsItsHighlightAndNoShadowOfTheBallFallsOnTheObject) {
         sim.height = 72;
         const Scene scene = scene_by_name(sim, rig.lamps, *rig.ball_diameter_mm);
         Scene alone = scene;
-        alone.ball.reset();
-        const BallCircle ball = ball_circle(scene.view, scene.ball->sphere);
+        alone.balls.clear();
+        const BallCircle ball = ball_circle(scene.view, scene.balls.front().sphere);
         const SceneTruth truth = render_truth(scene);
         std::vector<LampId> ids;
         for (std::uint32_t i = 0; i < rig.lamps.size(); ++i) ids.push_back({i});

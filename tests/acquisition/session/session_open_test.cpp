@@ -63,6 +63,38 @@ TEST_F(Open, AnUnsealedSessionIsToldApart) {
     EXPECT_THAT(failure_of<InputError>([&] { Session::open(import); }), HasSubstr("import the pictures again"));
 }
 
+TEST_F(Open, GeometryIsKeptAndMayBeAbsent) {
+    EXPECT_FALSE(Session::open(folder).info().geometry);
+    SessionInfo info = capture_info(0);
+    info.geometry.emplace();
+    info.geometry->mm_per_pixel = 0.25;
+    info.geometry->camera_distance_mm = 800;
+    info.geometry->principal_px = {159.5, 119.25};
+    info.geometry->ball_diameter_mm = 36;
+    info.geometry->distant_lamps = true;
+    info.geometry->lamps = {{"lamp-0", {100, -200, 900.5}}};
+    const fs::path other = temporary.path() / "other";
+    SessionWriter::create(other, info).seal();
+    EXPECT_EQ(Session::open(other).info().geometry, info.geometry);
+
+    const fs::path file = other / "data/session.json";
+    const std::string text = read_file(file);
+    for (const auto& [from, to] : std::vector<std::pair<std::string, std::string>>{
+             {"\"mm_per_pixel\": 0.25", "\"mm_per_pixel\": 0"},
+             {"\"mm_per_pixel\": 0.25", "\"mm_per_pixel\": -1e999"},
+             {"\"mm_per_pixel\": 0.25", "\"mm_per_pixel\": \"0.25\""},
+             {"\"camera_distance_mm\": 800.0", "\"camera_distance_mm\": -800.0"},
+             {"\"ball_diameter_mm\": 36.0", "\"ball_diameter_mm\": null"},
+             {"159.5,", "\"159.5\","},
+             {"159.5,", "159.5, 1,"},
+             {"900.5", "900.5, 4"},
+             {"\"distant_lamps\": true", "\"distant_lamps\": 1"},
+             {"\"name\": \"lamp-0\"", "\"name\": 0"}}) {
+        write_file(file, replaced(text, from, to));
+        EXPECT_THAT(failure_of<InputError>([&] { Session::open(other); }), HasSubstr("session.json")) << to;
+    }
+}
+
 struct Hostile {
     const char* what;
     const char* from;

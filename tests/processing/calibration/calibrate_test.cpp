@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 
 #include "acquisition/frame/error.h"
@@ -105,7 +107,7 @@ TEST(Calibrate, GivenBallIsTaken) {
     const BallScene scene;
     const auto lights = dome_of_lights(8);
     CalibrationOptions options;
-    options.ball = Ball{std::round(scene.ball.x), std::round(scene.ball.y), std::round(scene.ball.radius), 1.0};
+    options.balls = {Ball{std::round(scene.ball.x), std::round(scene.ball.y), std::round(scene.ball.radius), 1.0}};
     EXPECT_LT(errors_deg(calibrate(photographs(scene, lights), frame_names(8), options), lights).back(), 0.25);
 }
 
@@ -150,7 +152,7 @@ TEST(Calibrate, NoBallIsAnErrorWithARemedy) {
 
 TEST(Calibrate, BallOutsideThePictureIsAnError) {
     CalibrationOptions options;
-    options.ball = Ball{900, 20, 30, 1.0};
+    options.balls = {Ball{900, 20, 30, 1.0}};
     EXPECT_NE(message_of(photographs({}, dome_of_lights(4)), options).find("outside"), std::string::npos);
 }
 
@@ -158,7 +160,7 @@ TEST(Calibrate, NoHighlightAtAllIsAnError) {
     BallScene scene;
     scene.lamp_radiance = 0;
     CalibrationOptions options;
-    options.ball = scene.ball;
+    options.balls = {scene.ball};
     EXPECT_NE(message_of(photographs(scene, dome_of_lights(4)), options).find("highlight"), std::string::npos);
 }
 
@@ -176,9 +178,63 @@ TEST(Calibrate, FramesOfAnotherSizeAreNamed) {
     EXPECT_NE(message_of(frames, {}).find("frame1.tif"), std::string::npos);
 }
 
+TEST(Calibrate, TheSameBallTwiceIsAnError) {
+    const BallScene scene;
+    CalibrationOptions options;
+    options.balls = {scene.ball, scene.ball};
+    EXPECT_NE(message_of(photographs(scene, dome_of_lights(4)), options).find("overlap"), std::string::npos);
+}
+
+TEST(Calibrate, AHighlightOutsideTheBallIsAnError) {
+    const BallScene scene;
+    CalibrationOptions options;
+    options.highlights = {{"frame1.tif", {20, 20}}};
+    EXPECT_NE(message_of(photographs(scene, dome_of_lights(4)), options).find("outside the ball"), std::string::npos);
+}
+
+TEST(Calibrate, NearLampsNeedAScaleAndASecondBallOrTheRig) {
+    const auto frames = photographs({}, dome_of_lights(4));
+    CalibrationOptions options;
+    options.lamps = LampModel::near;
+    EXPECT_NE(message_of(frames, options).find("scale"), std::string::npos);
+    options.ball_diameter_mm = 36;
+    EXPECT_NE(message_of(frames, options).find("one ball"), std::string::npos);
+}
+
+TEST(Calibrate, ADiameterTellsTheScaleAndALampsModelFollowsFromTheRig) {
+    const auto lights = dome_of_lights(4);
+    const auto frames = photographs({}, lights);
+    CalibrationOptions options;
+    options.ball_diameter_mm = 36;
+    options.nominal.emplace();
+    for (const auto& light : lights) options.nominal->position_in_rig_mm.emplace_back(light * 700);
+    const auto near = calibrate(frames, frame_names(4), options);
+    EXPECT_NEAR(near.view->mm_per_pixel, 18 / 60.2, 0.002);
+    EXPECT_TRUE(near.lights[0].near);
+    for (auto& place : options.nominal->position_in_rig_mm) *place *= 10;
+    EXPECT_FALSE(calibrate(frames, frame_names(4), options).lights[0].near);
+    options.ball_diameter_mm.reset();
+    EXPECT_FALSE(calibrate(frames, frame_names(4), options).view);
+}
+
+TEST(CalibrationOptions, WhatIsNoLengthIsNamed) {
+    for (const double bad : {0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
+        CalibrationOptions options;
+        options.ball_diameter_mm = bad;
+        EXPECT_THROW(options.validate(), InputError);
+        options = {};
+        options.view = ViewGeometry{bad, {0, 0}};
+        EXPECT_THROW(options.validate(), InputError);
+        options = {};
+        options.nominal.emplace();
+        options.nominal->slack_mm = bad;
+        EXPECT_THROW(options.validate(), InputError);
+    }
+}
+
 TEST(CalibrationOptions, RadiusMustBePositive) {
     CalibrationOptions options;
-    options.ball = Ball{10, 10, -4, 1.0};
+    options.balls = {Ball{10, 10, -4, 1.0}};
     EXPECT_THROW(options.validate(), InputError);
 }
 

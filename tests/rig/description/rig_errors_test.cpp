@@ -145,6 +145,48 @@ INSTANTIATE_TEST_SUITE_P(
                     BadRig{"no_name", with("name = \"bench\"\n", ""), "rig.toml:1: [rig] name is missing"},
                     BadRig{"empty_name", with("name = \"bench\"", "name = \"\""), "name is empty"}));
 
+INSTANTIATE_TEST_SUITE_P(
+    Intrinsics, RigErrors,
+    testing::Values(
+        BadRig{"distance", with("mm_per_pixel = 0.5", "mm_per_pixel = 0.5\ndistance_mm = 0"),
+               "rig.toml:8: [camera.intrinsics] distance_mm is 0; allowed: 1 to 1000000"},
+        BadRig{"distance_nan", with("mm_per_pixel = 0.5", "mm_per_pixel = 0.5\ndistance_mm = nan"),
+               "distance_mm is nan; allowed"},
+        BadRig{"distance_alone", with("mm_per_pixel = 0.5", "distance_mm = 800"), "distance_mm needs mm_per_pixel"},
+        BadRig{"focal_alone", with("mm_per_pixel = 0.5", "focal_length_px = 800"),
+               "focal_length_px needs mm_per_pixel"},
+        BadRig{"focal_negative", with("mm_per_pixel = 0.5", "mm_per_pixel = 0.5\nfocal_length_px = -1"),
+               "focal_length_px is -1; allowed"},
+        BadRig{"disagree", with("mm_per_pixel = 0.5", "mm_per_pixel = 0.5\ndistance_mm = 800\nfocal_length_px = 2000"),
+               "rig.toml:9: [camera.intrinsics] focal_length_px times mm_per_pixel is 1000.0 mm, but distance_mm is "
+               "800.0"},
+        BadRig{"principal", with("mm_per_pixel = 0.5", "mm_per_pixel = 0.5\nprincipal_px = [1]"),
+               "principal_px must be 2 numbers in brackets"},
+        BadRig{"principal_far", with("mm_per_pixel = 0.5", "mm_per_pixel = 0.5\nprincipal_px = [1, 1e9]"),
+               "principal_px has 1000000000; allowed"},
+        BadRig{"distant", with("[lamps]\ndriver = \"sim\"", "[lamps]\ndriver = \"sim\"\ndistant = 1"),
+               "distant must be true or false"}));
+
+TEST(RigIntrinsics, TwoTellTheThird) {
+    const auto camera = [](const std::string& keys) {
+        return parse_rig(with("mm_per_pixel = 0.5", keys), "rig.toml").camera;
+    };
+    EXPECT_FALSE(camera("mm_per_pixel = 0.5").distance_mm);
+    EXPECT_DOUBLE_EQ(camera("mm_per_pixel = 0.5\nfocal_length_px = 1600").distance_mm.value(), 800);
+    EXPECT_DOUBLE_EQ(camera("distance_mm = 800\nfocal_length_px = 1600").mm_per_pixel.value(), 0.5);
+    EXPECT_EQ(camera("mm_per_pixel = 0.5\nprincipal_px = [150.5, 90]").principal_px->at(1), 90);
+}
+
+TEST(RigIntrinsics, SimulatedLampsAreDistantUnlessTheSceneIsNear) {
+    const auto rig = [](const std::string& scene) {
+        return parse_rig(with("width = 320", "scene = \"" + scene + "\""), "rig.toml");
+    };
+    EXPECT_TRUE(rig("torus-moss").distant_lamps);
+    EXPECT_FALSE(rig("torus-moss-near").distant_lamps);
+    EXPECT_FALSE(rig("torus-moss").camera.distance_mm);
+    EXPECT_EQ(rig("torus-perspective").camera.distance_mm, rig("torus-perspective").sim.camera_distance_mm);
+}
+
 std::string lamps_toml(int count) {
     std::string toml = "[rig]\nname = \"r\"\n[lamps]\n";
     for (int i = 0; i < count; ++i)

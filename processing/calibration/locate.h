@@ -1,0 +1,24 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
+
+#include "processing/calibration/calibration.h"
+
+namespace darkbox {
+
+/// A ball in the picture and what is known of its outline.
+struct LocatedBall {
+    Ball ball;
+    std::vector<cv::Point2d> contour;
+    std::size_t rejected = 0;        ///< readings off the outline
+    double contour_spread_px = 0;    ///< standard deviation of the contour's points
+    std::optional<double> sigma_px;  ///< of the circle itself, where the contour alone does not decide
+};
+
+/// The balls given by hand, in the mask, or found, best first.
+/// Throws InputError: none is found, one lies outside the picture, two are the same, the mask does not fit.
+std::vector<LocatedBall> locate_balls(const std::vector<cv::Mat3f>& frames, const CalibrationOptions& options);
+
+}  // namespace darkbox

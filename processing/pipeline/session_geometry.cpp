@@ -1,0 +1,59 @@
+#include "processing/pipeline/session_geometry.h"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+#include "processing/formats/picture.h"
+#include "processing/pipeline/session_files.h"
+
+namespace darkbox {
+namespace {
+
+std::optional<ViewGeometry> view_of(const CaptureGeometry& geometry, cv::Size size) {
+    if (!geometry.mm_per_pixel) return std::nullopt;
+    ViewGeometry view;
+    view.mm_per_pixel = *geometry.mm_per_pixel;
+    view.principal = {0.5 * (size.width - 1), 0.5 * (size.height - 1)};
+    if (geometry.principal_px) view.principal = {(*geometry.principal_px)[0], (*geometry.principal_px)[1]};
+    if (geometry.camera_distance_mm) view.distance_mm = *geometry.camera_distance_mm;
+    return view;
+}
+
+std::optional<NominalLamps> nominal_of(const CaptureGeometry& geometry, const std::vector<FrameRecord>& lit) {
+    NominalLamps nominal;
+    for (const FrameRecord& frame : lit) {
+        const auto named = std::find_if(geometry.lamps.begin(), geometry.lamps.end(),
+                                        [&](const NominalLamp& lamp) { return lamp.name == frame.lamp_name; });
+        nominal.position_in_rig_mm.emplace_back();
+        if (named == geometry.lamps.end()) continue;
+        const auto& p = named->position_mm;
+        nominal.position_in_rig_mm.back() = Eigen::Vector3d(p[0], p[1], p[2]);
+    }
+    const bool any = std::any_of(nominal.position_in_rig_mm.begin(), nominal.position_in_rig_mm.end(),
+                                 [](const auto& place) { return bool(place); });
+    return any ? std::optional(nominal) : std::nullopt;
+}
+
+}  // namespace
+
+CalibrationOptions with_geometry(const Session& session, CalibrationOptions options, cv::Size size) {
+    if (!options.object) options.object = object_centroid(session);
+    const auto& geometry = session.info().geometry;
+    if (!geometry) return options;
+    if (!options.view) options.view = view_of(*geometry, size);
+    if (!options.ball_diameter_mm) options.ball_diameter_mm = geometry->ball_diameter_mm;
+    if (options.lamps == LampModel::automatic && geometry->distant_lamps) options.lamps = LampModel::distant;
+    if (!options.nominal && options.lamps != LampModel::distant)
+        options.nominal = nominal_of(*geometry, frames_of_kind(session, FrameKind::lit));
+    return options;
+}
+
+std::optional<cv::Point2d> object_centroid(const Session& session) {
+    const auto path = extra_of(session, object_mask);
+    if (!path) return std::nullopt;
+    const cv::Moments moments = cv::moments(read_mask(*path), true);
+    if (!(moments.m00 > 0)) return std::nullopt;
+    return cv::Point2d(moments.m10 / moments.m00, moments.m01 / moments.m00);
+}
+
+}  // namespace darkbox
