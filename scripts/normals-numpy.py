@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """Least-squares photometric stereo as one writes it with OpenCV and numpy: what darkbox is measured against.
 
 usage: normals-numpy.py FOLDER OUT     FOLDER holds photographs and lights.lp; writes OUT/normals.png and albedo.png
