@@ -38,9 +38,14 @@ std::optional<TransferCurve> doubtful_curve(const Session& session) {
     return doubtful ? std::optional(lit.front().transfer) : std::nullopt;
 }
 
-void write_maps(const ResultFiles& files, const PhotometricStereoResult& solved, const WorkContext& work) {
+void write_surface(const ResultFiles& files, const PhotometricStereoResult& solved, const WorkContext& work) {
     step(work, {"integrating height", 0, 1, ""});
     const cv::Mat1f height = integrate_normals(solved.normals);
+    write_exr(files.height, height);
+    write_ply(files.surface, height, solved.normals, solved.albedo);
+}
+
+void write_maps(const ResultFiles& files, const PhotometricStereoResult& solved, const WorkContext& work) {
     step(work, {"writing maps", 0, 1, files.results_folder.string()});
     write_normal_map(files.normals, solved.normals);
     write_normal_map(files.normals_png, solved.normals);
@@ -49,21 +54,19 @@ void write_maps(const ResultFiles& files, const PhotometricStereoResult& solved,
     cv::Mat1f used;
     solved.lights_used.convertTo(used, CV_32F);
     write_exr(files.confidence, {{"lights_used", used}, {"residual", solved.residual}});
-    write_exr(files.height, height);
-    write_ply(files.surface, height, solved.normals, solved.albedo);
 }
 
 }  // namespace
 
-NormalsSummary run_normals(const Session& session, const PhotometricStereoOptions& options, const WorkContext& work) {
-    options.validate();
+NormalsSummary run_normals(const Session& session, const NormalsOptions& options, const WorkContext& work) {
+    options.stereo.validate();
     const ResultFiles files(session.folder());
     const Lights lights = load_lights(session);
     require_solvable(lights);
     NormalsSummary summary;
     Stopwatch watch;
     SessionPhotos photos(session);
-    const PhotometricStereoResult solved = photometric_stereo(photos, lights, options, work);
+    const PhotometricStereoResult solved = photometric_stereo(photos, lights, options.stereo, work);
     summary.seconds.solve = solved.seconds;
     summary.seconds.read = std::max(0.0, watch.lap() - solved.seconds);
     summary.solver = "lsq";
@@ -83,6 +86,7 @@ NormalsSummary run_normals(const Session& session, const PhotometricStereoOption
     watch.lap();
     remove_derived(session, {"texels", "shading"});
     write_maps(files, solved, work);
+    if (options.surface) write_surface(files, solved, work);
     summary.seconds.write = watch.lap();
     write_json(files.results_summary, to_json(summary));
     step(work, {"writing maps", 1, 1, ""});

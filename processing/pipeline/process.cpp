@@ -4,7 +4,7 @@ namespace darkbox {
 
 ProcessSummary run_process(const Session& session, const ProcessOptions& options, const WorkContext& work) {
     options.calibrate.calibration.validate();
-    options.normals.validate();
+    options.normals.stereo.validate();
     options.texels.validate();
     options.shading.validate();
     ProcessSummary summary;

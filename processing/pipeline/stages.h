@@ -42,6 +42,10 @@ struct CalibrateSummary {
 CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& options = {},
                                const WorkContext& work = {});
 
+struct NormalsOptions {
+    PhotometricStereoOptions stereo;
+    bool surface = true;  ///< also integrate the height and write height.exr and surface.ply
+};
 struct NormalsSummary {
     std::string solver;
     std::size_t images = 0;
@@ -54,8 +58,7 @@ struct NormalsSummary {
 };
 /// Writes results/normals.exr, normals.png, albedo.exr, albedo.png, confidence.exr (lights used, residual), height.exr,
 /// surface.ply.
-NormalsSummary run_normals(const Session& session, const PhotometricStereoOptions& options = {},
-                           const WorkContext& work = {});
+NormalsSummary run_normals(const Session& session, const NormalsOptions& options = {}, const WorkContext& work = {});
 
 struct TexelsSummary {
     int texels = 0;
@@ -86,7 +89,7 @@ ReportSummary run_report(const Session& session, const WorkContext& work = {});
 
 struct ProcessOptions {
     CalibrateOptions calibrate;
-    PhotometricStereoOptions normals;
+    NormalsOptions normals;
     TexelOptions texels;
     ShadingOptions shading;
 };

@@ -110,10 +110,13 @@ void add_calibrate_options(CLI::App& command, Arguments& a) {
 
 void add_normals_options(CLI::App& command, Arguments& a) {
     const std::map<std::string, Solver> solvers{{"lsq", Solver::lsq}};
-    command.add_option("--solver", a.options.normals.solver, "lsq: least squares over all lights")
+    command.add_option("--solver", a.options.normals.stereo.solver, "lsq: least squares over all lights")
         ->transform(CLI::CheckedTransformer(solvers).description("{lsq}"));
-    command.add_option("--memory-mib", a.options.normals.memory_mib, "Memory for photographs and maps while solving")
+    command
+        .add_option("--memory-mib", a.options.normals.stereo.memory_mib,
+                    "Memory for photographs and maps while solving")
         ->capture_default_str();
+    command.add_flag("!--no-surface", a.options.normals.surface, "Leave out height.exr and surface.ply");
 }
 
 void add_texels_options(CLI::App& command, Arguments& a) {
