@@ -48,7 +48,8 @@ void write_maps(const ResultFiles& files, const PhotometricStereoResult& solved,
     write_albedo_map(files.albedo_png, solved.albedo, viewing_gain(solved.albedo.albedo, solved.albedo.valid));
     cv::Mat1f used;
     solved.lights_used.convertTo(used, CV_32F);
-    write_exr(files.confidence, {{"lights_used", used}, {"residual", solved.residual}});
+    write_exr(files.confidence,
+              {{"lights_used", used}, {"residual", solved.residual}, {"sigma_deg", solved.sigma_deg}});
     write_exr(files.height, height);
     write_ply(files.surface, height, solved.normals, solved.albedo);
 }
@@ -66,7 +67,8 @@ NormalsSummary run_normals(const Session& session, const PhotometricStereoOption
     const PhotometricStereoResult solved = photometric_stereo(photos, lights, options, work);
     summary.seconds.solve = solved.seconds;
     summary.seconds.read = std::max(0.0, watch.lap() - solved.seconds);
-    summary.solver = "lsq";
+    summary.solver = options.solver == Solver::lsq ? "lsq" : "robust";
+    summary.body = solved.model.law.name();
     summary.images = static_cast<std::size_t>(direction_matrix(lights).rows());
     summary.pixels = solved.pixels;
     summary.residual_rms = solved.residual_rms;

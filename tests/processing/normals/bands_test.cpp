@@ -150,6 +150,7 @@ public:
     std::size_t bytes_per_row() const override { return 5472UL * 6 * 64; }
     std::size_t bytes_held() const override { return 0; }
     void read_next(int, PhotoBand&) override { throw std::logic_error("nothing to read"); }
+    void rewind() override {}
     cv::Mat1b mask() const override { return {}; }
 };
 
