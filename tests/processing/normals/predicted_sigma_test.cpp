@@ -34,7 +34,7 @@ Lights uncertain(Lights lights, double sigma_deg, unsigned seed) {
 std::vector<double> ratios(const Case& c, double light_sigma_deg) {
     std::vector<double> all;
     const NoiseModel channel{2e-3, 2e-4, 0};
-    for (unsigned seed = 1; seed <= (light_sigma_deg > 0 ? 24U : 4U); ++seed) {
+    for (unsigned seed = 1; seed <= (light_sigma_deg > 0 ? 16U : 3U); ++seed) {
         test::LitSphere sphere(test::spiral_lights(c.lights), test::lambert, 32, 28);
         sphere.add_noise(channel, seed);
         PhotometricStereoOptions options;
