@@ -18,6 +18,7 @@ constexpr float terminator_cosine =
 constexpr float loss_deviations = 3.0F;   ///< of Geman and McClure's loss
 constexpr float kept_deviations = 3.0F;   ///< the last fit: full weight within,
 constexpr float lost_deviations = 6.0F;   ///< none beyond
+constexpr float above_strictness = 1.5F;  ///< gloss lies above the fit only: such residuals count as this much larger
 constexpr float smallest_scale = 0.002F;  ///< of |g|: no material follows a law more closely
 constexpr float deviation_per_median = 1.4826F;
 constexpr float worst_reciprocal_condition = 1e-4F;  ///< of the moments of the lights kept
@@ -209,7 +210,7 @@ std::optional<PixelFit> PixelSolver::solve(const BodyFactor& factor) {
         for (std::size_t i = 0; i < samples.size(); ++i) {
             weight_[i] = 0;
             if (!lit_[i] || !(cosine_[i] > terminator_cosine)) continue;
-            const float t = std::abs(residual_[i]) / scale_;
+            const float t = std::abs(residual_[i]) * (residual_[i] > 0 ? above_strictness : 1.0F) / scale_;
             if (last) {
                 const float taper = std::clamp((lost_deviations - t) / (lost_deviations - kept_deviations), 0.0F, 1.0F);
                 weight_[i] = taper * square(scale_) / (square(scale_) - mean_noise_ + samples.noise_variance[i]);

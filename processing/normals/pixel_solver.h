@@ -38,7 +38,8 @@ struct PixelFit {
 ///    and Ikeuchi, PAMI 36(6) 2014), each improved by two concentration steps of least trimmed squares (Rousseeuw and
 ///    Van Driessen 1999); the start with the smallest median of absolute residuals goes on.
 /// 3. Reweighted least squares with Geman and McClure's loss, its scale from the median of absolute residuals; samples
-///    near the attached shadow's edge count nothing.
+///    near the attached shadow's edge count nothing, and what lies above the fit, where gloss is, is judged more
+///    strictly.
 /// 4. Last, least squares over what lies within a few deviations, weighted by noise: where every sample agrees this is
 ///    the efficient estimate.
 /// With fewer than seven lit samples only steps 3 and 4 are left, from least squares over all.
