@@ -156,7 +156,7 @@ public:
 
 TEST(Bands, TwoBandsAndTheMapsFitTheMemory) {
     PhotometricStereoOptions options;
-    options.memory_mib = 640;
+    options.memory_mib = 740;
     const int few = rows_of_a_band(SizeOnly(), options);
     options.memory_mib = 4096;
     EXPECT_GE(few, 1);
