@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "sim/noise.h"
+#include "sim/reflectance.h"
 
 namespace darkbox::sim {
 
@@ -20,8 +21,7 @@ struct Renderer::Fragment {
     Vec3 normal;
     Vec3 to_viewer;
     Rgb albedo;
-    double specular = 0.0;
-    double exponent = 1.0;
+    const Material* material = nullptr;  ///< none: matt
 };
 
 struct Renderer::Sample {
@@ -60,6 +60,20 @@ void for_each_row(int rows, const F& f) {
     tbb::parallel_for(tbb::blocked_range<int>(0, rows), [&](const tbb::blocked_range<int>& range) {
         for (int row = range.begin(); row < range.end(); ++row) f(row);
     });
+}
+
+/// Pi times the BRDF. Relief may turn a normal away from the camera; grazing light is all that is left then.
+Rgb reflectance(const Material& material, const Rgb& albedo, const Vec3& n, const Vec3& l, const Vec3& v) {
+    constexpr double grazing = 1e-3;
+    double body = 1.0, gloss = 0.0;
+    const bool seen = dot(n, v) > grazing;
+    if (material.slope_sigma > 0.0 && seen) body *= oren_nayar(n, l, v, material.slope_sigma);
+    if (material.coat_alpha > 0.0 && seen) {
+        body *= coat_transmission(n, l, v);
+        gloss += ggx(n, l, v, material.coat_alpha);
+    }
+    if (material.specular > 0.0) gloss += phong_lobe(n, l, v, material.specular, material.exponent);
+    return albedo * body + Rgb{1, 1, 1} * gloss;
 }
 
 }  // namespace
@@ -106,8 +120,7 @@ Renderer::Fragment Renderer::fragment(const Ray& ray, const std::optional<RayHit
     const Material& material = *hit->material;
     seen.albedo = material.texture->albedo(hit->point);
     seen.normal = normal_with_relief(*material.texture, hit->point, hit->normal);
-    seen.specular = material.specular;
-    seen.exponent = material.exponent;
+    seen.material = &material;
     return seen;
 }
 
@@ -130,12 +143,9 @@ Rgb Renderer::radiance(const Fragment& f, const SceneLamp& lamp) const {
     if (cosine <= 0.0 || dot(f.smooth_normal, light.direction) <= 0.0) return {};
     if (tracer_.blocked({f.position + f.geometric_normal * shadow_offset_mm, light.direction}, light.distance_mm))
         return {};
-    Rgb reflected = f.albedo * cosine;
-    if (f.specular > 0.0) {
-        const double along_mirror = dot(mirrored(-light.direction, f.normal), f.to_viewer);
-        if (along_mirror > 0.0) reflected += Rgb{1, 1, 1} * (f.specular * std::pow(along_mirror, f.exponent));
-    }
-    return reflected * light.irradiance;
+    const Rgb per_cosine =
+        f.material ? reflectance(*f.material, f.albedo, f.normal, light.direction, f.to_viewer) : f.albedo;
+    return per_cosine * light.irradiance * cosine;
 }
 
 /// A lamp of angular radius a that gives irradiance E has radiance E / (pi a^2); in units where a white matt surface

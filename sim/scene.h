@@ -11,12 +11,15 @@
 
 namespace darkbox::sim {
 
-/// Lambert with the texture's albedo, and Phong's highlight where specular > 0: radiance under a lamp of irradiance 1
-/// is albedo (n . l) + specular (r . v)^exponent.
+/// A matt body with the texture's albedo, and gloss over it. Without any of the numbers Lambert's law; with specular
+/// alone the radiance under a lamp of irradiance 1 is albedo (n . l) + specular (r . v)^exponent. reflectance.h has the
+/// formulas.
 struct Material {
     TexturePtr texture;
-    double specular = 0.0;
+    double specular = 0.0;  ///< Phong's strength
     double exponent = 30.0;
+    double coat_alpha = 0.0;   ///< width of a GGX coat's highlight; 0: no coat
+    double slope_sigma = 0.0;  ///< of Oren and Nayar's facets, radians; 0: Lambert
 };
 
 struct Sphere {

@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <charconv>
 #include <functional>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <sstream>
+#include <string_view>
 
 #include "acquisition/frame/error.h"
 #include "sim/noise.h"
@@ -93,16 +96,42 @@ struct SceneName {
     std::string texture = "lambert";
     bool near = false;
     bool perspective = false;
-    bool phong = false;
     int balls = 1;
+    Material material;  // but for its texture
 };
 
 [[noreturn]] void throw_unknown(const std::string& name, const std::string& problem) {
-    throw InputError(fmt::format("unknown simulated scene '{}': {}", name, problem),
-                     fmt::format("join a shape ({}), a texture ({}) and, if wanted, near, perspective, phong, "
-                                 "twoballs or threeballs by '-', "
-                                 "for example brick-torus or teapot-moss-near",
-                                 fmt::join(keys(shape_makers()), ", "), fmt::join(keys(texture_makers()), ", ")));
+    throw InputError(
+        fmt::format("unknown simulated scene '{}': {}", name, problem),
+        fmt::format("join a shape ({}), a texture ({}) and, if wanted, near, perspective, twoballs, threeballs "
+                    "and a material (phong60n30, ggx30, cloth40) by '-', for example brick-torus or teapot-moss-near",
+                    fmt::join(keys(shape_makers()), ", "), fmt::join(keys(texture_makers()), ", ")));
+}
+
+/// The number that `text` is, and nothing besides, between 1 and `most`.
+std::optional<int> whole_number(std::string_view text, int most) {
+    int number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    const bool good = error == std::errc() && end == text.data() + text.size() && number >= 1 && number <= most;
+    return good ? std::optional(number) : std::nullopt;
+}
+
+/// Whether the word names a material; adds it then.
+bool is_material(std::string_view word, Material& material) {
+    const auto percent_after = [&](std::string_view kind) -> std::optional<int> {
+        return word.starts_with(kind) ? whole_number(word.substr(kind.size()), 100) : std::nullopt;
+    };
+    if (const auto alpha = percent_after("ggx")) return material.coat_alpha = *alpha / 100.0, true;
+    if (const auto sigma = percent_after("cloth")) return material.slope_sigma = *sigma / 100.0, true;
+    if (word == "phong") word = "phong25n30";
+    const std::size_t n = word.find('n', 5);  // behind "phong"
+    if (!word.starts_with("phong") || n == std::string_view::npos) return false;
+    const auto strength = whole_number(word.substr(5, n - 5), 100);
+    const auto exponent = whole_number(word.substr(n + 1), 1000);
+    if (!strength || !exponent) return false;
+    material.specular = *strength / 100.0;
+    material.exponent = *exponent;
+    return true;
 }
 
 SceneName parse_scene_name(const std::string& name) {
@@ -117,13 +146,11 @@ SceneName parse_scene_name(const std::string& name) {
             parsed.near = true;
         else if (word == "perspective")
             parsed.perspective = true;
-        else if (word == "phong")
-            parsed.phong = true;
         else if (word == "twoballs")
             parsed.balls = 2;
         else if (word == "threeballs")
             parsed.balls = 3;
-        else
+        else if (!is_material(word, parsed.material))
             throw_unknown(name, fmt::format("'{}' is neither a shape, a texture nor a suffix", word));
     }
     if (parsed.shape.empty()) throw_unknown(name, "it names no shape");
@@ -162,9 +189,8 @@ Scene scene_by_name(const SimDescription& sim, const std::vector<LampDescription
     const SceneName name = parse_scene_name(sim.scene);
     Scene scene;
     scene.name = sim.scene;
-    Material material;
+    Material material = name.material;
     material.texture = texture_makers().at(name.texture)(sim.seed);
-    if (name.phong) material.specular = 0.25;
     for (auto& shape : shape_makers().at(name.shape)()) scene.object.push_back({std::move(shape), material});
     for (const LampDescription& lamp : lamps)
         scene.lamps.push_back({lamp.name, {lamp.position_mm[0], lamp.position_mm[1], lamp.position_mm[2]}});

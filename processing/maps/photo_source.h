@@ -34,7 +34,7 @@ struct PhotoBand {
     int cols() const { return photos.empty() ? 0 : photos.front().samples.cols; }
 };
 
-/// Photographs of one object under one lamp each that are read once from the top, band by band. Thread-compatible.
+/// Photographs of one object under one lamp each that are read from the top, band by band. Thread-compatible.
 class PhotoSource {
 public:
     virtual ~PhotoSource() = default;
@@ -49,6 +49,8 @@ public:
     /// Puts the next `rows` rows of every photograph into `band`, whose buffers it uses again where they fit. Reads
     /// photographs in parallel. Throws InputError that names the file at fault.
     virtual void read_next(int rows, PhotoBand& band) = 0;
+    /// The next band is the top one again.
+    virtual void rewind() = 0;
 
     /// 255 on the object. Where the bands came without one it was found on the way: ask after the last band.
     virtual cv::Mat1b mask() const = 0;
@@ -68,6 +70,7 @@ public:
     std::size_t bytes_per_row() const override { return 0; }
     std::size_t bytes_held() const override { return 0; }
     void read_next(int rows, PhotoBand& band) override;
+    void rewind() override { next_row_ = 0; }
     cv::Mat1b mask() const override { return mask_; }
 
 private:

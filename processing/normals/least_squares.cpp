@@ -150,13 +150,15 @@ void prefer_large_pages(const cv::Mat& map) {
 
 }  // namespace
 
-SolvedMaps::SolvedMaps(cv::Size size) : normal(size), albedo(size), valid(size), residual(size), lights_used(size) {
-    for (const cv::Mat* map : std::initializer_list<const cv::Mat*>{&normal, &albedo, &valid, &residual, &lights_used})
+SolvedMaps::SolvedMaps(cv::Size size)
+    : normal(size), albedo(size), valid(size), residual(size), lights_used(size), sigma_deg(size) {
+    for (const cv::Mat* map :
+         std::initializer_list<const cv::Mat*>{&normal, &albedo, &valid, &residual, &lights_used, &sigma_deg})
         prefer_large_pages(*map);
 }
 
 std::size_t SolvedMaps::bytes_per_pixel() {
-    return 2 * sizeof(cv::Vec3f) + sizeof(uchar) + sizeof(float) + sizeof(ushort);
+    return 2 * sizeof(cv::Vec3f) + sizeof(uchar) + 2 * sizeof(float) + sizeof(ushort);
 }
 
 std::size_t solve_row_least_squares(const PhotoBand& band, const LightSet& set, float min_albedo, int row,

@@ -14,8 +14,10 @@
 #include "acquisition/frame/error.h"
 #include "processing/maps/parallel.h"
 #include "processing/normals/bands.h"
+#include "processing/normals/by_pixel.h"
 #include "processing/normals/least_squares.h"
 #include "processing/normals/light_set.h"
+#include "processing/normals/predicted_sigma.h"
 
 namespace darkbox {
 namespace {
@@ -23,8 +25,9 @@ namespace {
 /// Solves bands one after the other into the maps of the whole picture.
 class BandSolver {
 public:
-    BandSolver(const LightSet& set, const PhotometricStereoOptions& options, const WorkContext& work, SolvedMaps& maps)
-        : set_(set), options_(options), work_(work), maps_(maps) {}
+    BandSolver(const LightField& field, const SampleModel& model, const PhotometricStereoOptions& options,
+               const WorkContext& work, SolvedMaps& maps)
+        : field_(field), model_(model), options_(options), work_(work), maps_(maps) {}
 
     void solve(const PhotoBand& band) {
         mask_known_ = !band.mask.empty();
@@ -45,10 +48,16 @@ public:
 
 private:
     std::size_t solve_row(const PhotoBand& band, int row) {
-        return solve_row_least_squares(band, set_, options_.min_albedo, row, maps_);
+        if (options_.solver == Solver::robust)
+            return solve_row_by_pixel(band, field_, PixelMethod::robust, model_, options_.min_albedo, row, maps_);
+        if (!field_.uniform())
+            return solve_row_by_pixel(band, field_, PixelMethod::least_squares, model_, options_.min_albedo, row,
+                                      maps_);
+        return solve_row_least_squares(band, field_.set(), options_.min_albedo, row, maps_);
     }
 
-    const LightSet& set_;
+    const LightField& field_;
+    const SampleModel& model_;
     const PhotometricStereoOptions& options_;
     const WorkContext& work_;
     SolvedMaps& maps_;
@@ -84,8 +93,8 @@ void solve_bands(PhotoSource& photos, int band_rows, const WorkContext& work, Ba
 void keep_inside(const cv::Mat1b& mask, SolvedMaps& maps) {
     cv::Mat1b outside;
     cv::compare(mask, 0, outside, cv::CMP_EQ);
-    for (cv::Mat* map :
-         std::initializer_list<cv::Mat*>{&maps.normal, &maps.albedo, &maps.valid, &maps.residual, &maps.lights_used})
+    for (cv::Mat* map : std::initializer_list<cv::Mat*>{&maps.normal, &maps.albedo, &maps.valid, &maps.residual,
+                                                        &maps.lights_used, &maps.sigma_deg})
         map->setTo(cv::Scalar::all(0), outside);
 }
 
@@ -115,13 +124,32 @@ void sum_up(const SolvedMaps& maps, PhotometricStereoResult& result) {
     if (total.samples > 0) result.residual_rms = std::sqrt(total.squared / static_cast<double>(total.samples));
 }
 
-PhotometricStereoResult solve(PhotoSource& photos, const LightSet& set, const PhotometricStereoOptions& options,
+SampleModel model_for(PhotoSource& photos, const LightField& field, const PhotometricStereoOptions& options,
+                      int band_rows, const WorkContext& work) {
+    if (options.solver == Solver::lsq) return {BodyLaw{}, options.model.noise.value_or(NoiseModel{})};
+    const SampleModel model = find_sample_model(photos, field, options.model, band_rows, work);
+    stop_if_wished(work);
+    return model;
+}
+
+/// The confidence of least squares over distant lights, which the pixel loops leave to the finished maps.
+void predict_least_squares_sigma(const LightField& field, const NoiseModel& noise, SolvedMaps& maps) {
+    const LeastSquaresSigma sigma(field, noise);
+    const float variance = median_variance(maps);
+    tbb::parallel_for(0, maps.valid.rows, [&](int row) { sigma.write_row(variance, row, maps); });
+}
+
+PhotometricStereoResult solve(PhotoSource& photos, const LightField& field, const PhotometricStereoOptions& options,
                               const WorkContext& work) {
     const int band_rows = rows_of_a_band(photos, options);
+    const auto start = std::chrono::steady_clock::now();
+    const SampleModel model = model_for(photos, field, options, band_rows, work);
+    const double model_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     SolvedMaps maps(photos.size());
-    BandSolver solver(set, options, work, maps);
+    BandSolver solver(field, model, options, work, maps);
     solve_bands(photos, band_rows, work, solver);
     if (!solver.mask_known()) keep_inside(photos.mask(), maps);
+    if (options.solver == Solver::lsq && field.uniform()) predict_least_squares_sigma(field, model.noise, maps);
 
     PhotometricStereoResult result;
     sum_up(maps, result);
@@ -129,8 +157,10 @@ PhotometricStereoResult solve(PhotoSource& photos, const LightSet& set, const Ph
     result.albedo = {maps.albedo, maps.valid.clone()};
     result.residual = maps.residual;
     result.lights_used = maps.lights_used;
+    result.sigma_deg = maps.sigma_deg;
+    result.model = model;
     result.not_finite = solver.not_finite();
-    result.seconds = solver.busy_seconds() / tbb::this_task_arena::max_concurrency();
+    result.seconds = model_seconds + solver.busy_seconds() / tbb::this_task_arena::max_concurrency();
     return result;
 }
 
@@ -139,6 +169,7 @@ PhotometricStereoResult solve(PhotoSource& photos, const LightSet& set, const Ph
 void PhotometricStereoOptions::validate() const {
     if (!(std::isfinite(min_albedo) && min_albedo >= 0.0F))
         throw InputError(fmt::format("min_albedo is {}", min_albedo), "allowed: 0 or more (1.0 = full scale)");
+    if (model.noise) model.noise->validate();
     if (memory_mib < 1) throw InputError(fmt::format("memory_mib is {}", memory_mib), "allowed: 1 or more");
     if (band_rows < 0)
         throw InputError(fmt::format("band_rows is {}", band_rows), "allowed: 1 or more, or 0 for as many as fit");
@@ -151,7 +182,8 @@ PhotometricStereoResult photometric_stereo(PhotoSource& photos, const Lights& li
         throw InputError(fmt::format("there are {} photographs but {} lights", photos.count(), lights.size()),
                          "give one light for each photograph, in the same order");
     const LightSet set = LightSet::from(lights);
-    return on_threads_of(work, [&] { return solve(photos, set, options, work); });
+    const LightField field(lights, set, options.geometry, photos.size());
+    return on_threads_of(work, [&] { return solve(photos, field, options, work); });
 }
 
 PhotometricStereoResult photometric_stereo(const PhotoStack& stack, const Lights& lights,

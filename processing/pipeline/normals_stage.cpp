@@ -53,7 +53,8 @@ void write_maps(const ResultFiles& files, const PhotometricStereoResult& solved,
     write_albedo_map(files.albedo_png, solved.albedo, viewing_gain(solved.albedo.albedo, solved.albedo.valid));
     cv::Mat1f used;
     solved.lights_used.convertTo(used, CV_32F);
-    write_exr(files.confidence, {{"lights_used", used}, {"residual", solved.residual}});
+    write_exr(files.confidence,
+              {{"lights_used", used}, {"residual", solved.residual}, {"sigma_deg", solved.sigma_deg}});
 }
 
 }  // namespace
@@ -69,7 +70,8 @@ NormalsSummary run_normals(const Session& session, const NormalsOptions& options
     const PhotometricStereoResult solved = photometric_stereo(photos, lights, options.stereo, work);
     summary.seconds.solve = solved.seconds;
     summary.seconds.read = std::max(0.0, watch.lap() - solved.seconds);
-    summary.solver = "lsq";
+    summary.solver = options.stereo.solver == Solver::lsq ? "lsq" : "robust";
+    summary.body = solved.model.law.name();
     summary.images = static_cast<std::size_t>(direction_matrix(lights).rows());
     summary.pixels = solved.pixels;
     summary.residual_rms = solved.residual_rms;

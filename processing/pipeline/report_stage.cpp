@@ -117,7 +117,13 @@ void add_normals(const ResultFiles& files, ReportContent& content) {
     const double top = 1.0 / viewing_gain(grey, normals.valid, 99.0);
     content.pictures.push_back(
         {heat(residual, normals.valid, top), "Residual",
-         fmt::format("What Lambert's law leaves unexplained; white is {:.3g} of full scale", top)});
+         fmt::format("What the solver's law leaves unexplained; white is {:.3g} of full scale", top)});
+    const cv::Mat1f sigma = read_exr_channel(files.confidence, "sigma_deg");
+    cv::merge(std::vector<cv::Mat>{sigma, sigma, sigma}, grey);
+    const double top_deg = 1.0 / viewing_gain(grey, normals.valid, 99.0);
+    content.pictures.push_back(
+        {heat(sigma, normals.valid, top_deg), "Uncertainty",
+         fmt::format("Predicted standard deviation of the normals; white is {:.3g} degrees", top_deg)});
     double low = 0, high = 0;
     cv::minMaxLoc(height, &low, &high, nullptr, nullptr, normals.valid);
     content.pictures.push_back({heat(cv::Mat(height - low), normals.valid, std::max(high - low, 1e-6)), "Height",

@@ -49,7 +49,8 @@ PhotoStack load_stack(const Session& session, const WorkContext& work) {
     return stack;
 }
 
-SessionPhotos::SessionPhotos(const Session& session) : frames_(session, require_lit(session)) {
+SessionPhotos::SessionPhotos(const Session& session) : session_(session) {
+    frames_.emplace(session, require_lit(session));
     if (const auto mask = extra_of(session, object_mask)) {
         given_mask_ = read_mask(*mask);
         require_size("the mask", given_mask_->size(), size());
@@ -69,12 +70,17 @@ std::size_t SessionPhotos::bytes_held() const {
 }
 
 void SessionPhotos::read_next(int rows, PhotoBand& band) {
-    frames_.read_next(rows, band);
+    frames_->read_next(rows, band);
     if (given_mask_)
         band.mask = given_mask_->rowRange(band.first_row, band.first_row + rows);
     else
         look_for_brightest(band);
     keep_rows(band);
+}
+
+void SessionPhotos::rewind() {
+    frames_.emplace(session_, require_lit(session_));
+    kept_.clear();
 }
 
 void SessionPhotos::look_for_brightest(const PhotoBand& band) {

@@ -20,17 +20,19 @@ namespace darkbox {
 PhotoStack load_stack(const Session& session, const WorkContext& work = {});
 
 /// The same photographs for stages that work by bands of rows: nothing is held whole but what the mask needs, where it
-/// is not given. Thread-compatible.
+/// is not given. Refers to the session. Thread-compatible.
 class SessionPhotos : public PhotoSource {
 public:
     /// Opens the files. Throws InputError as load_stack() does.
     explicit SessionPhotos(const Session& session);
 
-    cv::Size size() const override { return frames_.size(); }
-    std::size_t count() const override { return frames_.count(); }
-    std::size_t bytes_per_row() const override { return frames_.bytes_per_row(); }
+    cv::Size size() const override { return frames_->size(); }
+    std::size_t count() const override { return frames_->count(); }
+    std::size_t bytes_per_row() const override { return frames_->bytes_per_row(); }
     std::size_t bytes_held() const override;
     void read_next(int rows, PhotoBand& band) override;
+    /// Opens the files again.
+    void rewind() override;
     cv::Mat1b mask() const override;
 
     /// Some of the rows read so far, in order, spread evenly over the picture: all of them for small pictures, else so
@@ -47,7 +49,8 @@ private:
     void look_for_brightest(const PhotoBand& band);
     void keep_rows(const PhotoBand& band);
 
-    FrameBands frames_;
+    const Session& session_;
+    std::optional<FrameBands> frames_;  ///< always there; opened again to rewind
     std::vector<std::string> files_;
     std::optional<cv::Mat1b> given_mask_;
     std::vector<cv::Vec3d> balls_;  ///< in view beside the object

@@ -47,7 +47,8 @@ struct NormalsOptions {
     bool surface = true;  ///< also integrate the height and write height.exr and surface.ply
 };
 struct NormalsSummary {
-    std::string solver;
+    std::string solver;  ///< lsq or robust
+    std::string body;    ///< the law of the material's body that was used
     std::size_t images = 0;
     std::size_t pixels = 0;                        ///< valid
     double residual_rms = 0;                       ///< linear radiance
@@ -56,8 +57,8 @@ struct NormalsSummary {
     double megapixel_images_per_second = 0;  ///< of the solver
     std::vector<std::string> warnings;
 };
-/// Writes results/normals.exr, normals.png, albedo.exr, albedo.png, confidence.exr (lights used, residual), height.exr,
-/// surface.ply.
+/// Writes results/normals.exr, normals.png, albedo.exr, albedo.png, confidence.exr (lights used, residual, predicted
+/// standard deviation in degrees), height.exr, surface.ply.
 NormalsSummary run_normals(const Session& session, const NormalsOptions& options = {}, const WorkContext& work = {});
 
 struct TexelsSummary {

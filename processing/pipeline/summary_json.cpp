@@ -51,6 +51,7 @@ ordered_json to_json(const CalibrateSummary& summary) {
 
 ordered_json to_json(const NormalsSummary& summary) {
     ordered_json json{{"solver", summary.solver},
+                      {"body", summary.body},
                       {"images", summary.images},
                       {"pixels", summary.pixels},
                       {"residual_rms", summary.residual_rms},

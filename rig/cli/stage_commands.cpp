@@ -46,6 +46,7 @@ std::string describe(const NormalsSummary& summary) {
     std::string text =
         fmt::format("{} pixels from {} photographs ({}), residual {:.4f} of full scale, {:.2f} s", summary.pixels,
                     summary.images, summary.solver, summary.residual_rms, summary.seconds.solve);
+    if (summary.body != "lambert") text += fmt::format("\nthe material's body follows the law '{}'", summary.body);
     if (summary.mean_angular_error_deg)
         text += fmt::format("\nmean angular error against the truth that came with the pictures: {:.2f} degrees",
                             *summary.mean_angular_error_deg);
@@ -109,9 +110,11 @@ void add_calibrate_options(CLI::App& command, Arguments& a) {
 }
 
 void add_normals_options(CLI::App& command, Arguments& a) {
-    const std::map<std::string, Solver> solvers{{"lsq", Solver::lsq}};
-    command.add_option("--solver", a.options.normals.stereo.solver, "lsq: least squares over all lights")
-        ->transform(CLI::CheckedTransformer(solvers).description("{lsq}"));
+    const std::map<std::string, Solver> solvers{{"lsq", Solver::lsq}, {"robust", Solver::robust}};
+    command
+        .add_option("--solver", a.options.normals.stereo.solver,
+                    "lsq: least squares over all lights; robust: leaves out shadows and highlights")
+        ->transform(CLI::CheckedTransformer(solvers).description("{lsq,robust}"));
     command
         .add_option("--memory-mib", a.options.normals.stereo.memory_mib,
                     "Memory for photographs and maps while solving")

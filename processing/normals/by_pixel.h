@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstddef>
+
+#include "processing/maps/photo_source.h"
+#include "processing/normals/body_law.h"
+#include "processing/normals/least_squares.h"
+#include "processing/normals/light_field.h"
+#include "processing/normals/noise_model.h"
+
+namespace darkbox {
+
+/// What one law of the body and the sensor's noise say about samples; the same for the whole picture.
+struct SampleModel {
+    BodyLaw law;
+    NoiseModel noise;
+};
+
+enum class PixelMethod {
+    least_squares,  ///< all samples that are not clipped
+    robust,         ///< PixelSolver::solve()
+};
+
+/// Solves one row of a band pixel by pixel, each with its own lights: for near lights, and for the robust solver.
+/// Writes the row band.first_row + row of the maps. Albedo per channel is the least-squares factor of (N.L) f over the
+/// samples kept, weighted as they were. Returns how many pixels on the object were left out for a sample that is not a
+/// finite number.
+std::size_t solve_row_by_pixel(const PhotoBand& band, const LightField& field, PixelMethod method,
+                               const SampleModel& model, float min_albedo, int row, SolvedMaps& maps);
+
+}  // namespace darkbox

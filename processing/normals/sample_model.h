@@ -1,0 +1,32 @@
+#pragma once
+
+#include <optional>
+
+#include "acquisition/frame/progress.h"
+#include "processing/maps/photo_source.h"
+#include "processing/normals/by_pixel.h"
+#include "processing/normals/light_field.h"
+
+namespace darkbox {
+
+/// What is known beforehand; the rest is found from the photographs.
+struct GivenModel {
+    std::optional<BodyLaw> law;
+    std::optional<NoiseModel> noise;
+};
+
+/// Finds noise and body law from pairs of neighbouring pixels on a regular grid over the picture, whatever the bands'
+/// height and the number of threads. Reads the photographs once from the top to the bottom, and rewinds them.
+///
+/// Noise: each pixel is fitted, and the residuals under one light of two neighbours are subtracted. What no law
+/// explains in shading and texture is nearly the same for both and drops out; the noise stays. The variance of these
+/// differences is taken in eight classes of radiance by the median of absolute values, and a straight line through the
+/// classes gives read noise and shot gain. Cameras whose neighbouring samples share noise (after demosaicing) look
+/// better than they are.
+///
+/// Law: the one whose fits leave the smallest misfit in the median over pixels, each relative to Lambert's. It must
+/// beat Lambert's law by 3 %, and there must be at least seven lights; else Lambert's law is kept.
+SampleModel find_sample_model(PhotoSource& photos, const LightField& field, const GivenModel& given, int band_rows,
+                              const WorkContext& work);
+
+}  // namespace darkbox
