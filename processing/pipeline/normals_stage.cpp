@@ -9,6 +9,7 @@
 #include "processing/pipeline/angular_error.h"
 #include "processing/pipeline/frame_tally.h"
 #include "processing/pipeline/session_files.h"
+#include "processing/pipeline/solved.h"
 #include "processing/pipeline/stack.h"
 #include "processing/pipeline/stages.h"
 #include "processing/pipeline/steps.h"
@@ -64,6 +65,7 @@ NormalsSummary run_normals(const Session& session, const PhotometricStereoOption
     Stopwatch watch;
     SessionPhotos photos(session);
     const PhotometricStereoResult solved = photometric_stereo(photos, lights, options, work);
+    require_any_normal(solved);
     summary.seconds.solve = solved.seconds;
     summary.seconds.read = std::max(0.0, watch.lap() - solved.seconds);
     summary.solver = "lsq";
