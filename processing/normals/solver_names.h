@@ -13,7 +13,8 @@
 namespace darkbox {
 
 /// Each solver as the command line and results/summary.json name it.
-inline constexpr std::array<std::pair<Solver, std::string_view>, 1> solver_names{{{Solver::lsq, "lsq"}}};
+inline constexpr std::array<std::pair<Solver, std::string_view>, 2> solver_names{
+    {{Solver::lsq, "lsq"}, {Solver::robust, "robust"}}};
 
 constexpr std::string_view name(Solver solver) {
     for (const auto& [known, text] : solver_names)

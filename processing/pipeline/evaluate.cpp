@@ -14,6 +14,7 @@
 #include "processing/normals/solver_names.h"
 #include "processing/pipeline/ideal_sphere.h"
 #include "processing/pipeline/session_files.h"
+#include "processing/pipeline/solved.h"
 #include "processing/pipeline/stack.h"
 #include "processing/pipeline/stages.h"
 #include "processing/pipeline/steps.h"
@@ -99,7 +100,9 @@ public:
     PhotometricStereoResult solve(Solver solver) {
         const PhotoStack& photographs = stack();
         step(work_, {"solving normals", 0, 1, std::string(name(solver))});
-        return photometric_stereo(photographs, lights_, solving_with(solver), work_);
+        PhotometricStereoResult solved = photometric_stereo(photographs, lights_, solving_with(solver), work_);
+        require_any_normal(solved);
+        return solved;
     }
 
     NormalMap normals() {
@@ -163,7 +166,7 @@ void leave_lights_out(Bench& bench, const WorkContext& work, Evaluation& evaluat
     }
     const std::vector<Predictor> predictors{lambert_predictor()};
     for (const Predictor& predictor : predictors) evaluation.predictors.push_back(predictor.name);
-    evaluation.held_out = leave_one_light_out(bench.stack(), bench.lights(), bench.solve(Solver::lsq), predictors,
+    evaluation.held_out = leave_one_light_out(bench.stack(), bench.lights(), bench.solve(Solver::robust), predictors,
                                               solving_with(bench.solver()), work);
     for (const HeldOutLight& light : evaluation.held_out)
         if (light.errors.empty())

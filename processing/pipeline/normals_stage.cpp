@@ -6,9 +6,11 @@
 #include "processing/formats/ply.h"
 #include "processing/formats/srgb.h"
 #include "processing/normals/integrate.h"
+#include "processing/normals/solver_names.h"
 #include "processing/pipeline/angular_error.h"
 #include "processing/pipeline/frame_tally.h"
 #include "processing/pipeline/session_files.h"
+#include "processing/pipeline/solved.h"
 #include "processing/pipeline/stack.h"
 #include "processing/pipeline/stages.h"
 #include "processing/pipeline/steps.h"
@@ -68,9 +70,10 @@ NormalsSummary run_normals(const Session& session, const NormalsOptions& options
     Stopwatch watch;
     SessionPhotos photos(session);
     const PhotometricStereoResult solved = photometric_stereo(photos, lights, options.stereo, work);
+    require_any_normal(solved);
     summary.seconds.solve = solved.seconds;
     summary.seconds.read = std::max(0.0, watch.lap() - solved.seconds);
-    summary.solver = options.stereo.solver == Solver::lsq ? "lsq" : "robust";
+    summary.solver = name(options.stereo.solver);
     summary.body = solved.model.law.name();
     summary.images = static_cast<std::size_t>(direction_matrix(lights).rows());
     summary.pixels = solved.pixels;

@@ -140,7 +140,7 @@ std::string cells(const PredictionErrors& errors) {
 }
 
 std::string held_out_table(const Evaluation& evaluation, std::size_t predictor) {
-    std::size_t width = 8;
+    std::size_t width = std::string("photograph").size();
     for (const HeldOutLight& light : evaluation.held_out) width = std::max(width, light.file.size());
     std::string text = fmt::format(
         "each photograph predicted without it by {}, normals by {}: error relative to the "

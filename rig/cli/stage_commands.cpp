@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "processing/normals/solver_names.h"
 #include "processing/pipeline/stages.h"
 #include "processing/pipeline/summary_json.h"
 #include "rig/cli/arguments.h"
@@ -110,7 +111,8 @@ void add_calibrate_options(CLI::App& command, Arguments& a) {
 }
 
 void add_normals_options(CLI::App& command, Arguments& a) {
-    const std::map<std::string, Solver> solvers{{"lsq", Solver::lsq}, {"robust", Solver::robust}};
+    std::map<std::string, Solver> solvers;
+    for (const auto& [solver, text] : solver_names) solvers.emplace(text, solver);
     command
         .add_option("--solver", a.options.normals.stereo.solver,
                     "lsq: least squares over all lights; robust: leaves out shadows and highlights")

@@ -119,7 +119,7 @@ TEST(PairedBootstrap, CoversTheTrueDifferenceThoughNeighboursDepend) {
     options.resamples = 400;
     options.block_px = 16;
     int covered = 0;
-    constexpr int trials = 300, side = 160;
+    constexpr int trials = 1000, side = 160;
     for (int trial = 0; trial < trials; ++trial) {
         const cv::Mat1d first(side, side, 0.0);
         const PairedBootstrap difference = paired_bootstrap(first, smooth_noise(engine, side), options);

@@ -134,6 +134,19 @@ TEST(HeldOut, ALightThatTheOthersCannotDoWithoutHasNoErrors) {
     EXPECT_TRUE(lights[3].errors.empty());
 }
 
+TEST(HeldOut, IsTheSameOnAnyNumberOfThreads) {
+    const test::TexturedSphere scene = test::textured_sphere(64, 8);
+    std::vector<double> errors[2];
+    for (const int threads : {1, 3}) {
+        WorkContext work;
+        work.threads = threads;
+        const auto lights = leave_one_light_out(
+            scene.stack, scene.lights, photometric_stereo(scene.stack, scene.lights), {lambert_predictor()}, {}, work);
+        for (const HeldOutLight& light : lights) errors[threads / 3].push_back(light.errors[0][all]->rmse_relative);
+    }
+    EXPECT_EQ(errors[0], errors[1]);
+}
+
 TEST(HeldOut, ThreeLightsAreTooFew) {
     test::TexturedSphere scene = fully_lit_sphere();
     for (std::size_t i = 3; i < 8; ++i) scene.lights[i].used = false;

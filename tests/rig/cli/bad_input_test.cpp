@@ -138,6 +138,31 @@ TEST_F(BadInput, MalformedLightIsRefusedBeforeAnyWork) {
     EXPECT_FALSE(fs::exists(path("x.png")));
 }
 
+TEST_F(BadInput, EvaluateNeedsLightsAndATruthToCompareWith) {
+    const std::string s = session();
+    expect_one_error(darkbox_program({"evaluate", s}), "darkbox calibrate");
+    ASSERT_EQ(darkbox_program({"calibrate", s}).status, 0);
+    expect_one_error(darkbox_program({"evaluate", s, "--compare-solvers", "lsq", "lsq"}), "no true normals");
+    expect_one_error(darkbox_program({"evaluate", s, "--drop", "p9.png"}), "p9.png");
+    expect_one_error(darkbox_program({"evaluate", s, "--lights", path("none.lp").string()}), "none.lp");
+    EXPECT_EQ(darkbox_program({"evaluate", s, "--solver", "magic"}).status, 2);
+}
+
+TEST_F(BadInput, EvaluateTellsOfEveryPhotograph) {
+    const std::string s = session();
+    ASSERT_EQ(darkbox_program({"calibrate", s}).status, 0);
+    const auto r = darkbox_program({"evaluate", s, "--ideal-sphere", "--compare-solvers", "lsq", "lsq", "--json"});
+    ASSERT_EQ(r.status, 0) << r.err;
+    const auto json = nlohmann::json::parse(r.out);
+    ASSERT_EQ(json["held_out"].size(), good_lights.size());
+    for (const auto& light : json["held_out"]) {
+        EXPECT_THAT(light["file"].get<std::string>(), testing::StartsWith("p"));
+        EXPECT_GT(light["rmse_relative"]["lambert"], 0.0);
+    }
+    EXPECT_LT(json["mean_angular_error_deg"], 5.0);
+    EXPECT_FALSE(json["comparison"]["second_is_better"].get<bool>());
+}
+
 TEST_F(BadInput, StrictTurnsWarningsIntoStatusThree) {
     const std::vector<Direction> near_plane{{-0.6, 0.01, 0.8}, {0, 0.03, 1}, {0.6, -0.02, 0.8}, {0.28, 0.02, 0.96}};
     ASSERT_EQ(import(photographs("photos", near_plane), near_plane).status, 0);

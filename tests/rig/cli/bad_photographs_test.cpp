@@ -173,6 +173,19 @@ TEST_F(BadPhotographs, AMaskOfAnotherSize) {
                      "mask.png");
 }
 
+TEST_F(BadPhotographs, AMaskOnTheBackground) {
+    cv::Mat1b mask(side, side, uchar{0});
+    mask.row(2) = 255;
+    cv::imwrite(path("mask.png").string(), mask);
+    ASSERT_EQ(
+        darkbox_program({"import", photographs("photos", good_lights), "--lights", lights_file(good_lights), "--mask",
+                         path("mask.png").string(), "--transfer", "linear", "--out", path("s").string()})
+            .status,
+        0);
+    expect_one_error(darkbox_program({"process", path("s").string()}), "mask");
+    expect_one_error(darkbox_program({"evaluate", path("s").string()}), "mask");
+}
+
 TEST_F(BadPhotographs, OneFolderTwice) {
     const std::string photos = photographs("photos", good_lights);
     expect_one_error(darkbox_program({"import", photos, photos + "/.", "--out", path("s").string()}), "twice");
