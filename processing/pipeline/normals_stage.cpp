@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "processing/formats/calibration_file.h"
 #include "processing/formats/exr.h"
 #include "processing/formats/json_file.h"
 #include "processing/formats/map_files.h"
@@ -38,9 +39,16 @@ std::optional<TransferCurve> doubtful_curve(const Session& session) {
     return doubtful ? std::optional(lit.front().transfer) : std::nullopt;
 }
 
-void write_maps(const ResultFiles& files, const PhotometricStereoResult& solved, const WorkContext& work) {
+HeightFacts facts_of(const HeightMap& map, const MeshCounts& mesh) {
+    HeightFacts facts{map.unit == HeightUnit::millimetres ? "mm" : "pixels", 0, 0, map.parts, mesh, map.seconds};
+    cv::minMaxLoc(map.height, &facts.lowest, &facts.highest, nullptr, nullptr, map.valid);
+    return facts;
+}
+
+HeightFacts write_maps(const ResultFiles& files, const PhotometricStereoResult& solved, const WorkContext& work) {
     step(work, {"integrating height", 0, 1, ""});
-    const cv::Mat1f height = integrate_normals(solved.normals);
+    const std::optional<ViewGeometry> view = read_calibration(files.calibration).calibration.view;
+    const HeightMap height = integrate_normals({solved.normals, view}, {}, work);
     step(work, {"writing maps", 0, 1, files.results_folder.string()});
     write_normal_map(files.normals, solved.normals);
     write_normal_map(files.normals_png, solved.normals);
@@ -49,8 +57,8 @@ void write_maps(const ResultFiles& files, const PhotometricStereoResult& solved,
     cv::Mat1f used;
     solved.lights_used.convertTo(used, CV_32F);
     write_exr(files.confidence, {{"lights_used", used}, {"residual", solved.residual}});
-    write_exr(files.height, height);
-    write_ply(files.surface, height, solved.normals, solved.albedo);
+    write_exr(files.height, height.height);
+    return facts_of(height, write_ply(files.surface, height, solved.normals, solved.albedo, view));
 }
 
 }  // namespace
@@ -82,7 +90,7 @@ NormalsSummary run_normals(const Session& session, const PhotometricStereoOption
     for (std::string& warning : tally.warnings(lights)) summary.warnings.push_back(std::move(warning));
     watch.lap();
     remove_derived(session, {"texels", "shading"});
-    write_maps(files, solved, work);
+    summary.height = write_maps(files, solved, work);
     summary.seconds.write = watch.lap();
     write_json(files.results_summary, to_json(summary));
     step(work, {"writing maps", 1, 1, ""});

@@ -33,11 +33,18 @@ ordered_json to_json(const CalibrateSummary& summary) {
             {"seconds", seconds_json(summary.seconds)}};
 }
 
+ordered_json height_json(const HeightFacts& height) {
+    return {{"unit", height.unit},      {"lowest", height.lowest},          {"highest", height.highest},
+            {"parts", height.parts},    {"vertices", height.mesh.vertices}, {"faces", height.mesh.faces},
+            {"seconds", height.seconds}};
+}
+
 ordered_json to_json(const NormalsSummary& summary) {
     ordered_json json{{"solver", summary.solver},
                       {"images", summary.images},
                       {"pixels", summary.pixels},
                       {"residual_rms", summary.residual_rms},
+                      {"height", height_json(summary.height)},
                       {"seconds", seconds_json(summary.seconds)},
                       {"megapixel_images_per_second", summary.megapixel_images_per_second},
                       {"warnings", summary.warnings}};
