@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "processing/formats/report/ellipse.h"
 #include "processing/formats/report/html.h"
 #include "processing/formats/report/plots.h"
 
@@ -12,7 +12,7 @@ namespace {
 
 constexpr double radius = 170;  // of the 90 degree rim, SVG units
 constexpr double half = 200;
-constexpr double shown_sigmas = 10;
+constexpr double ellipse_size = 7;         // SVG units, of a typical light
 constexpr std::size_t most_numbered = 32;  // beyond, numbers would cover each other; names are still shown on hover
 
 struct Place {
@@ -38,20 +38,29 @@ std::string number_beside(const Place& p, std::size_t number) {
     return fmt::format("<text class='label' x='{:.2f}' y='{:.2f}'>{}</text>", p.x + 8, p.y - 6, number);
 }
 
-std::string mark(const Light& light, const std::string& label, double size) {
+Eigen::Vector2d on_plot(const Eigen::Vector3d& direction) {
+    const Place p = place_of(direction);
+    return {p.x, p.y};
+}
+
+std::string mark(const Light& light, const std::string& label, double size, double magnification) {
     const Place p = place_of(light.direction);
-    const double sigma = std::max(light.sigma_deg() * shown_sigmas / 90.0 * radius, 0.0);
-    const std::string uncertainty =
-        sigma > 0 ? fmt::format("<circle class='sigma' cx='{:.2f}' cy='{:.2f}' r='{:.2f}'/>", p.x, p.y, sigma) : "";
+    const std::string sigma =
+        light.sigma_deg() > 0 ? fmt::format(", standard deviation {:.3f}°", light.sigma_deg()) : std::string();
     return fmt::format(
-        "<g class='{}'><title>{}: {:.1f}° off the camera's axis</title>{}<circle class='lamp' cx='{:.2f}' cy='{:.2f}' "
+        "<g class='{}'><title>{}: {:.1f}° off the camera's axis{}</title>{}<circle class='lamp' cx='{:.2f}' "
+        "cy='{:.2f}' "
         "r='{}'/>{}</g>",
-        light.used ? "used" : "unused", escaped(light.file), p.off_axis_deg, uncertainty, p.x, p.y, size, label);
+        light.used ? "used" : "unused", escaped(light.file), p.off_axis_deg, sigma,
+        ellipse_svg(uncertainty(light, on_plot), {p.x, p.y}, magnification), p.x, p.y, size, label);
 }
 
 }  // namespace
 
+double light_plot_magnification(const Lights& lights) { return magnification_for(lights, on_plot, ellipse_size); }
+
 std::string light_plot(const Lights& lights) {
+    const double magnification = light_plot_magnification(lights);
     std::string svg = fmt::format(
         "<svg class='plot' viewBox='{0} {0} {1} {1}' role='img' aria-label='light directions'>", -half, 2 * half);
     for (const double degrees : {30.0, 60.0, 90.0}) svg += ring(degrees);
@@ -60,7 +69,8 @@ std::string light_plot(const Lights& lights) {
                        radius + 14);
     const bool numbered = lights.size() <= most_numbered;
     for (std::size_t i = 0; i < lights.size(); ++i)
-        svg += mark(lights[i], numbered ? number_beside(place_of(lights[i].direction), i + 1) : "", numbered ? 5 : 3);
+        svg += mark(lights[i], numbered ? number_beside(place_of(lights[i].direction), i + 1) : "", numbered ? 4 : 3,
+                    magnification);
     return svg + "</svg>";
 }
 
