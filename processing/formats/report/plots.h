@@ -9,8 +9,8 @@ namespace darkbox {
 
 // Inline SVG; colours come from the page's style.
 
-/// Lights as the camera sees them come: the middle is the camera's own direction, the rim is at right angles to it, x
-/// to the right and y up; angles from the axis are to scale. Ellipses show one standard deviation, magnified.
+/// Lights as the camera sees them come: the middle is the camera's own direction, the rim 30, 60 or 90 degrees
+/// off it, x to the right and y up; angles from the axis are to scale. Ellipses show one standard deviation, magnified.
 std::string light_plot(const Lights& lights);
 double light_plot_magnification(const Lights& lights);
 
