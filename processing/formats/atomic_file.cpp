@@ -21,8 +21,18 @@ namespace fs = std::filesystem;
                                      : "check the path and its permissions");
 }
 
+fs::path folder_of(const fs::path& path) { return path.has_parent_path() ? path.parent_path() : fs::path("."); }
+
+void make_folder(const fs::path& folder) {
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (error) fail("make the folder", folder, error.value());
+}
+
+}  // namespace
+
 /// A descriptor that is closed on every way out.
-class Descriptor {
+class AtomicFile::Descriptor {
 public:
     Descriptor(const fs::path& path, int flags) : path_(path), fd_(::open(path.c_str(), flags | O_CLOEXEC, 0666)) {
         if (fd_ < 0) fail("open", path_, errno);
@@ -48,28 +58,31 @@ private:
     int fd_;
 };
 
-void make_folder(const fs::path& folder) {
-    std::error_code error;
-    fs::create_directories(folder, error);
-    if (error) fail("make the folder", folder, error.value());
+AtomicFile::AtomicFile(fs::path path) : path_(std::move(path)) {
+    const fs::path folder = folder_of(path_);
+    make_folder(folder);
+    part_ = folder / fmt::format(".{}.part-{}", path_.filename().string(), ::getpid());
+    file_ = std::make_unique<Descriptor>(part_, O_WRONLY | O_CREAT | O_TRUNC);
 }
 
-}  // namespace
+AtomicFile::~AtomicFile() {
+    if (file_) ::unlink(part_.c_str());
+}
+
+void AtomicFile::write(std::span<const std::byte> bytes) { file_->write(bytes); }
+void AtomicFile::write(std::string_view text) { write(std::as_bytes(std::span(text))); }
+
+void AtomicFile::commit() {
+    file_->flush();
+    if (::rename(part_.c_str(), path_.c_str()) != 0) fail("put in place", path_, errno);
+    file_.reset();
+    Descriptor(folder_of(path_), O_RDONLY | O_DIRECTORY).flush();
+}
 
 void write_file(const fs::path& path, std::span<const std::byte> bytes) {
-    const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
-    make_folder(folder);
-    const fs::path part = folder / fmt::format(".{}.part-{}", path.filename().string(), ::getpid());
-    try {
-        Descriptor file(part, O_WRONLY | O_CREAT | O_TRUNC);
-        file.write(bytes);
-        file.flush();
-        if (::rename(part.c_str(), path.c_str()) != 0) fail("put in place", path, errno);
-    } catch (...) {
-        ::unlink(part.c_str());
-        throw;
-    }
-    Descriptor(folder, O_RDONLY | O_DIRECTORY).flush();
+    AtomicFile file(path);
+    file.write(bytes);
+    file.commit();
 }
 
 void write_file(const fs::path& path, std::string_view text) { write_file(path, std::as_bytes(std::span(text))); }

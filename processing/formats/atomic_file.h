@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -14,6 +15,25 @@ namespace darkbox {
 /// system's reason.
 void write_file(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void write_file(const std::filesystem::path& path, std::string_view text);
+
+/// The same for a file that is written piece by piece: it appears on commit(), and never if that is not reached.
+/// Thread-compatible.
+class AtomicFile {
+public:
+    explicit AtomicFile(std::filesystem::path path);
+    AtomicFile(const AtomicFile&) = delete;
+    AtomicFile& operator=(const AtomicFile&) = delete;
+    ~AtomicFile();
+
+    void write(std::span<const std::byte> bytes);
+    void write(std::string_view text);
+    void commit();
+
+private:
+    class Descriptor;
+    std::filesystem::path path_, part_;
+    std::unique_ptr<Descriptor> file_;
+};
 
 /// Throws InputError when the file is missing, is not a regular file, or cannot be read.
 std::vector<std::byte> read_file(const std::filesystem::path& path);

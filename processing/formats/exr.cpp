@@ -145,9 +145,14 @@ void write_exr(const fs::path& path, const cv::Mat3f& image) {
 
 void write_exr(const fs::path& path, const cv::Mat1f& image) { write_exr(path, std::vector<ExrChannel>{{"Y", image}}); }
 
-cv::Mat1f read_exr_channel(const fs::path& path, const std::string& channel) {
+std::optional<cv::Mat1f> find_exr_channel(const fs::path& path, const std::string& channel) {
     const auto channels = decode_exr(read_file(path), path.string(), most_pixels);
     const cv::Mat1f* found = find(channels, channel);
+    return found ? std::optional(*found) : std::nullopt;
+}
+
+cv::Mat1f read_exr_channel(const fs::path& path, const std::string& channel) {
+    const std::optional<cv::Mat1f> found = find_exr_channel(path, channel);
     if (!found) throw bad_picture(path.string(), fmt::format("has no channel {}", channel));
     return *found;
 }

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,8 @@ void write_exr(const std::filesystem::path& path, const cv::Mat1f& image);
 
 /// One channel by name, as float. Throws InputError when the file is damaged or has no such channel.
 cv::Mat1f read_exr_channel(const std::filesystem::path& path, const std::string& channel);
+/// The same; no value when there is no such channel.
+std::optional<cv::Mat1f> find_exr_channel(const std::filesystem::path& path, const std::string& channel);
 /// R, G, B, or Y replicated; values as stored, not checked for NaN.
 cv::Mat3f read_exr_colour(const std::filesystem::path& path);
 

@@ -5,13 +5,23 @@
 #include <optional>
 
 #include "processing/maps/maps.h"
+#include "processing/maps/view.h"
+#include "processing/normals/integrate.h"
 
 namespace darkbox {
 
-/// Binary little-endian mesh of the height field: a vertex for every valid pixel (x right, y up, z to the camera) with
-/// its normal and colour, two triangles where four neighbours are valid. Units are millimetres where the scale is
-/// known, pixels otherwise; the file's comment says which. Throws InputError for an empty mask.
-void write_ply(const std::filesystem::path& path, const cv::Mat1f& height_px, const NormalMap& normals,
-               const AlbedoMap& albedo, std::optional<double> mm_per_pixel = {});
+struct MeshCounts {
+    std::size_t vertices = 0;
+    std::size_t faces = 0;
+};
+
+/// Binary little-endian mesh of a surface seen from the camera: a vertex with normal and colour for every valid pixel,
+/// two triangles, counter-clockwise as the camera sees them, for every square of four pixels that no depth edge
+/// crosses. Viewer frame (x right, y up, z to the camera): millimetres through view.point_at() where a view is given,
+/// else pixels about the picture's centre; the file's comment says which. Written row by row: memory holds a few rows
+/// and a number for each pixel. Throws InputError for an empty surface, maps that differ in size, or a file that
+/// cannot be written.
+MeshCounts write_ply(const std::filesystem::path& path, const HeightMap& surface, const NormalMap& normals,
+                     const AlbedoMap& albedo, const std::optional<ViewGeometry>& view = {});
 
 }  // namespace darkbox

@@ -1,124 +1,211 @@
 #include "processing/normals/integrate.h"
 
-#include <Eigen/IterativeLinearSolvers>
-#include <Eigen/SparseCholesky>
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "acquisition/frame/error.h"
+#include "processing/maps/parallel.h"
+#include "processing/maps/require.h"
+#include "processing/normals/bilateral.h"
+#include "processing/normals/difference_solver.h"
+#include "processing/normals/slopes.h"
 
 namespace darkbox {
 namespace {
 
-using Sparse = Eigen::SparseMatrix<double>;
+using Heights = std::vector<double>;
 
-constexpr float steepest = 0.05F;              // least n_z: 87 degrees; beyond it the slope is noise
-constexpr double anchor = 1e-8;                // makes each connected part's mean height 0 instead of anything
-constexpr int most_direct_unknowns = 400'000;  // a direct solution of more takes gigabytes
-constexpr int most_iterations = 400;
-constexpr double tolerance = 1e-6;
+constexpr int coarsest_side = 48;          // pixels; from there on the solution is carried to twice the size
+constexpr double noise_is_no_break = 4.0;  // standard deviations of the misfits
+/// How far one re-weighting is solved before the next goes on from there, and how far the last.
+constexpr double solve_tolerance = 0.1, last_tolerance = 1e-3;
+constexpr int solve_iterations = 12, last_iterations = 10;
+constexpr int last_passes = 2;  // the second removes what single precision left
 
-/// The normal equations of all height differences between valid neighbours.
-struct Equations {
-    Sparse matrix;
-    Eigen::VectorXd right;
-    cv::Mat1i unknown;  ///< by pixel, -1 where not valid
+struct Integration {
+    explicit Integration(const PixelGrid& grid) : heights(grid.size(), 0.0), shares(grid), edges(grid) {}
+    Heights heights;
+    Shares shares;
+    BilateralEdges edges;
+    int iterations = 0;
 };
 
-double slope_right(const cv::Vec3f& n) { return -n[0] / std::max(n[2], steepest); }
-double slope_down(const cv::Vec3f& n) { return n[1] / std::max(n[2], steepest); }
-
-cv::Mat1i number_pixels(const cv::Mat1b& valid) {
-    cv::Mat1i number(valid.size(), -1);
-    int count = 0;
-    for (int y = 0; y < valid.rows; ++y)
-        for (int x = 0; x < valid.cols; ++x)
-            if (valid(y, x)) number(y, x) = count++;
-    return number;
+/// Moves the heights by the difference equations' solution under the present weights.
+void relax(const Slopes& slopes, double tolerance, int most_iterations, Integration& state) {
+    const PixelGrid& grid = slopes.grid;
+    const BilateralEdges& edges = state.edges;
+    std::vector<float> residual(grid.size(), 0.0F);
+    for_blocks(grid.begin(), grid.end(), [&](std::size_t first, std::size_t last) {
+        for (std::size_t i = first; i < last; ++i)
+            residual[i] =
+                edges.pull_right[i - 1] - edges.pull_right[i] + edges.pull_down[i - grid.stride()] - edges.pull_down[i];
+    });
+    const std::vector<float> step =
+        DifferenceSolver(grid, edges.weights).solve(std::move(residual), tolerance, most_iterations);
+    for_blocks(0, grid.size(), [&](std::size_t first, std::size_t last) {
+        for (std::size_t i = first; i < last; ++i) state.heights[i] += static_cast<double>(step[i]);
+    });
 }
 
-Equations equations_of(const NormalMap& map) {
-    Equations e{{}, {}, number_pixels(map.valid)};
-    const int count = cv::countNonZero(map.valid);
-    e.right = Eigen::VectorXd::Zero(count);
-    std::vector<Eigen::Triplet<double>> terms;
-    terms.reserve(static_cast<std::size_t>(count) * 5);
-    Eigen::VectorXd diagonal = Eigen::VectorXd::Constant(count, anchor);
-    const auto difference = [&](int a, int b, double rise) {  // z_b - z_a = rise
-        diagonal[a] += 1;
-        diagonal[b] += 1;
-        terms.emplace_back(std::max(a, b), std::min(a, b), -1.0);  // lower triangle
-        e.right[a] -= rise;
-        e.right[b] += rise;
-    };
-    for (int y = 0; y < map.valid.rows; ++y)
-        for (int x = 0; x < map.valid.cols; ++x) {
-            const int here = e.unknown(y, x);
-            if (here < 0) continue;
-            const cv::Vec3f& n = map.normal(y, x);
-            if (x + 1 < map.valid.cols && e.unknown(y, x + 1) >= 0)
-                difference(here, e.unknown(y, x + 1), (slope_right(n) + slope_right(map.normal(y, x + 1))) / 2);
-            if (y + 1 < map.valid.rows && e.unknown(y + 1, x) >= 0)
-                difference(here, e.unknown(y + 1, x), (slope_down(n) + slope_down(map.normal(y + 1, x))) / 2);
+/// Twice the heights of the half-size solution, and inside each of its pixels the slope.
+Heights guess_from(const Heights& coarse, const PixelGrid& half, const Slopes& slopes) {
+    Heights heights(slopes.grid.size(), 0.0);
+    for (int y = 0; y < slopes.grid.height; ++y)
+        for (int x = 0; x < slopes.grid.width; ++x) {
+            const std::size_t i = slopes.grid.at(x, y);
+            if (!slopes.valid(i)) continue;
+            heights[i] = 2 * coarse[half.at(x / 2, y / 2)] + (x % 2 - 0.5) * static_cast<double>(slopes.right[i]) +
+                         (y % 2 - 0.5) * static_cast<double>(slopes.down[i]);
         }
-    for (int i = 0; i < count; ++i) terms.emplace_back(i, i, diagonal[i]);
-    e.matrix.resize(count, count);
-    e.matrix.setFromTriplets(terms.begin(), terms.end());
-    return e;
+    return heights;
 }
 
-/// Every second pixel's slopes, averaged over the valid ones of its 2x2 block.
-NormalMap halved(const NormalMap& map) {
-    const cv::Size size((map.valid.cols + 1) / 2, (map.valid.rows + 1) / 2);
-    NormalMap half{cv::Mat3f(size, cv::Vec3f(0, 0, 0)), cv::Mat1b(size, uchar{0})};
-    for (int y = 0; y < map.valid.rows; ++y)
-        for (int x = 0; x < map.valid.cols; ++x) {
-            if (!map.valid(y, x)) continue;
-            half.normal(y / 2, x / 2) += map.normal(y, x);
-            half.valid(y / 2, x / 2) = 255;
+void require_running(const WorkContext& work) {
+    if (work.cancelled()) throw Cancelled("the integration of height was cancelled", "run it again to get heights");
+}
+
+Integration integrate(const Slopes& slopes, const IntegrationOptions& options, const WorkContext& work) {
+    Integration state(slopes.grid);
+    if (std::max(slopes.grid.width, slopes.grid.height) > coarsest_side) {
+        const Slopes half = halved(slopes);
+        state.heights = guess_from(integrate(half, options, work).heights, half.grid, slopes);
+    }
+    double sharpness = 0, energy = 0;
+    if (options.method == IntegrationMethod::bilateral) {
+        if (std::max(slopes.grid.width, slopes.grid.height) <= coarsest_side) {
+            update_edges(slopes, state.shares, state.heights, 0, state.edges);
+            relax(slopes, last_tolerance, last_iterations, state);
         }
-    for (int y = 0; y < size.height; ++y)
-        for (int x = 0; x < size.width; ++x)
-            if (half.valid(y, x)) half.normal(y, x) = cv::normalize(half.normal(y, x));
-    return half;
+        sharpness = std::pow(std::max(options.breaks_at, noise_is_no_break * misfit_scale(slopes, state.heights)), -2);
+        for (int iteration = 0; iteration < options.most_iterations; ++iteration) {
+            require_running(work);
+            update_shares(slopes, state.heights, sharpness, state.shares);
+            update_edges(slopes, state.shares, state.heights, sharpness, state.edges);
+            ++state.iterations;
+            if (iteration > 0 && std::abs(energy - state.edges.energy) <= options.tolerance * energy) break;
+            energy = state.edges.energy;
+            relax(slopes, solve_tolerance, solve_iterations, state);
+        }
+    }
+    for (int pass = 0; pass < last_passes; ++pass) {
+        require_running(work);
+        update_edges(slopes, state.shares, state.heights, sharpness, state.edges);
+        relax(slopes, last_tolerance, last_iterations, state);
+    }
+    return state;
 }
 
-Eigen::VectorXd guess_from(const cv::Mat1f& half, const cv::Mat1i& unknown, int count) {
-    Eigen::VectorXd guess(count);
-    for (int y = 0; y < unknown.rows; ++y)
-        for (int x = 0; x < unknown.cols; ++x)
-            if (unknown(y, x) >= 0) guess[unknown(y, x)] = 2.0 * half(y / 2, x / 2);
-    return guess;
+/// Numbers 1... of the connected parts; 0 outside.
+cv::Mat1i parts_of(const cv::Mat1b& valid) {
+    cv::Mat1i part;
+    cv::connectedComponents(valid, part, 4, CV_32S);
+    return part;
 }
 
-Eigen::VectorXd solve_directly(const Equations& e) {
-    const Eigen::SimplicialLDLT<Sparse> solver(e.matrix);
-    return solver.solve(e.right);
+/// Per part the mean of value(x, y).
+template <class Value>
+std::vector<double> means_of(const cv::Mat1i& part, int parts, Value&& value) {
+    std::vector<double> sum(static_cast<std::size_t>(parts) + 1, 0.0), count(sum.size(), 0.0);
+    for (int y = 0; y < part.rows; ++y)
+        for (int x = 0; x < part.cols; ++x)
+            if (part(y, x) > 0) {
+                sum[static_cast<std::size_t>(part(y, x))] += value(x, y);
+                ++count[static_cast<std::size_t>(part(y, x))];
+            }
+    for (std::size_t p = 1; p < sum.size(); ++p) sum[p] /= std::max(count[p], 1.0);
+    return sum;
 }
 
-/// From coarse to fine: the half-size solution leaves only fine detail to the iterations.
-Eigen::VectorXd solve_from_coarse(const Equations& e, const NormalMap& normals) {
-    const cv::Mat1f half = integrate_normals(halved(normals));
-    Eigen::ConjugateGradient<Sparse, Eigen::Lower> solver;
-    solver.setMaxIterations(most_iterations);
-    solver.setTolerance(tolerance);
-    solver.compute(e.matrix);
-    return solver.solveWithGuess(e.right, guess_from(half, e.unknown, static_cast<int>(e.right.size())));
+/// Heights in pixels along each ray's own scale become z in the viewer frame, its mean 0 over each part.
+class Gauge {
+public:
+    explicit Gauge(const std::optional<ViewGeometry>& view) : view_(view) {}
+
+    /// What is averaged over a part: the height itself, or under perspective the depth up to a factor.
+    double averaged(double height) const { return perspective() ? std::exp(-height / focal_px()) : height; }
+    double z(double height, double mean) const {
+        if (perspective()) return view_->distance_mm * (1 - averaged(height) / mean);
+        return (height - mean) * (view_ ? view_->mm_per_pixel : 1.0);
+    }
+
+private:
+    bool perspective() const { return view_ && view_->perspective(); }
+    double focal_px() const { return view_->distance_mm / view_->mm_per_pixel; }
+    const std::optional<ViewGeometry>& view_;
+};
+
+HeightMap map_of(const IntegrationInput& input, const cv::Rect& box, const Slopes& slopes, const Integration& found,
+                 const IntegrationOptions& options) {
+    HeightMap map;
+    map.valid = cv::Mat1b(input.normals.valid.size(), uchar{0});
+    map.cut = map.valid.clone();
+    map.height = cv::Mat1f(map.valid.size(), 0.0F);
+    map.unit = input.view ? HeightUnit::millimetres : HeightUnit::pixels;
+    map.iterations = found.iterations;
+    const std::vector<unsigned char> cuts = cuts_of(slopes, found.edges, options.cut_below);
+    for (int y = 0; y < box.height; ++y)
+        for (int x = 0; x < box.width; ++x) {
+            map.valid(box.y + y, box.x + x) = slopes.valid(slopes.grid.at(x, y)) ? 255 : 0;
+            map.cut(box.y + y, box.x + x) = cuts[slopes.grid.at(x, y)];
+        }
+    const cv::Mat1i part = parts_of(map.valid);
+    double most = 0;
+    cv::minMaxLoc(part, nullptr, &most);
+    map.parts = static_cast<int>(most);
+    const Gauge gauge(input.view);
+    const auto height = [&](int x, int y) { return found.heights[slopes.grid.at(x - box.x, y - box.y)]; };
+    const std::vector<double> offset = means_of(part, map.parts, height);
+    const std::vector<double> mean = means_of(part, map.parts, [&](int x, int y) {
+        return gauge.averaged(height(x, y) - offset[static_cast<std::size_t>(part(y, x))]);
+    });
+    for (int y = 0; y < part.rows; ++y)
+        for (int x = 0; x < part.cols; ++x) {
+            const auto p = static_cast<std::size_t>(part(y, x));
+            if (p > 0) map.height(y, x) = static_cast<float>(gauge.z(height(x, y) - offset[p], mean[p]));
+        }
+    return map;
+}
+
+void require_usable(const IntegrationInput& input) {
+    if (input.normals.valid.empty() || cv::countNonZero(input.normals.valid) == 0)
+        throw InputError("the normal map has no valid pixel to integrate", "check the mask");
+    require_size("the normal map", input.normals.normal.size(), input.normals.valid.size());
+    if (input.confidence.empty()) return;
+    require_size("the confidence map", input.confidence.size(), input.normals.valid.size());
+    for (int y = 0; y < input.confidence.rows; ++y)
+        for (int x = 0; x < input.confidence.cols; ++x)
+            if (const float c = input.confidence(y, x); input.normals.valid(y, x) && !(c > 0 && std::isfinite(c)))
+                throw InputError(fmt::format("the confidence at ({}, {}) is {}", x, y, c),
+                                 "give a positive number wherever the normal is valid");
 }
 
 }  // namespace
 
-cv::Mat1f integrate_normals(const NormalMap& normals) {
-    if (normals.valid.empty() || cv::countNonZero(normals.valid) == 0)
-        throw InputError("the normal map has no valid pixel to integrate", "check the mask");
-    const Equations e = equations_of(normals);
-    const Eigen::VectorXd z =
-        e.right.size() <= most_direct_unknowns ? solve_directly(e) : solve_from_coarse(e, normals);
-    cv::Mat1f height(normals.valid.size(), 0.0F);
-    for (int y = 0; y < height.rows; ++y)
-        for (int x = 0; x < height.cols; ++x)
-            if (e.unknown(y, x) >= 0) height(y, x) = static_cast<float>(z[e.unknown(y, x)]);
-    return height;
+void IntegrationOptions::validate() const {
+    const auto require = [](bool holds, const char* field, double value, const char* allowed) {
+        if (!holds) throw InputError(fmt::format("{} is {}", field, value), fmt::format("allowed: {}", allowed));
+    };
+    require(breaks_at > 0 && breaks_at <= 100, "breaks_at", breaks_at, "above 0, to 100 (pixels per pixel)");
+    require(most_iterations >= 1 && most_iterations <= 10'000, "most_iterations", most_iterations, "1 to 10000");
+    require(tolerance > 0 && tolerance < 1, "tolerance", tolerance, "between 0 and 1");
+    require(cut_below > 0 && cut_below < 1, "cut_below", cut_below, "between 0 and 1");
+}
+
+HeightMap integrate_normals(const IntegrationInput& input, const IntegrationOptions& options, const WorkContext& work) {
+    options.validate();
+    require_usable(input);
+    const auto start = std::chrono::steady_clock::now();
+    const cv::Rect box = cv::boundingRect(input.normals.valid);
+    const Slopes slopes = slopes_of(input, box);
+    const Integration found = on_threads_of(work, [&] { return integrate(slopes, options, work); });
+    HeightMap map = map_of(input, box, slopes, found, options);
+    map.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return map;
 }
 
 }  // namespace darkbox

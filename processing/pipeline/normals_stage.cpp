@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "processing/formats/calibration_file.h"
 #include "processing/formats/exr.h"
 #include "processing/formats/json_file.h"
 #include "processing/formats/map_files.h"
@@ -19,6 +20,8 @@
 
 namespace darkbox {
 namespace {
+
+constexpr int near_light_passes = 2;  ///< more change nothing that can be seen
 
 /// Truth of another size, or of nothing that was solved, is for evaluate to refuse: the normals are good without it.
 std::optional<double> error_against_truth(const Session& session, const NormalMap& normals) {
@@ -40,11 +43,34 @@ std::optional<TransferCurve> doubtful_curve(const Session& session) {
     return doubtful ? std::optional(lit.front().transfer) : std::nullopt;
 }
 
-void write_surface(const ResultFiles& files, const PhotometricStereoResult& solved, const WorkContext& work) {
+HeightFacts facts_of(const HeightMap& map, const MeshCounts& mesh) {
+    HeightFacts facts{map.unit == HeightUnit::millimetres ? "mm" : "pixels", 0, 0, map.parts, mesh, map.seconds};
+    cv::minMaxLoc(map.height, &facts.lowest, &facts.highest, nullptr, nullptr, map.valid);
+    return facts;
+}
+
+HeightFacts write_surface(const ResultFiles& files, const PhotometricStereoResult& solved,
+                          const std::optional<ViewGeometry>& view, const WorkContext& work) {
     step(work, {"integrating height", 0, 1, ""});
-    const cv::Mat1f height = integrate_normals(solved.normals);
-    write_exr(files.height, height);
-    write_ply(files.surface, height, solved.normals, solved.albedo);
+    const HeightMap height = integrate_normals({solved.normals, view}, {}, work);
+    write_exr(files.height, height.height);
+    return facts_of(height, write_ply(files.surface, height, solved.normals, solved.albedo, view));
+}
+
+/// Near lights and near cameras need to know where each pixel lies: first in the plane z = 0, then on the surface that
+/// the last normals gave.
+PhotometricStereoResult solve_normals(SessionPhotos& photos, const Calibration& calibration,
+                                      PhotometricStereoOptions options, const WorkContext& work) {
+    options.geometry.view = calibration.view;
+    PhotometricStereoResult solved = photometric_stereo(photos, calibration.lights, options, work);
+    const bool near = std::any_of(calibration.lights.begin(), calibration.lights.end(),
+                                  [](const Light& light) { return light.used && light.near; });
+    for (int pass = 0; near && pass < near_light_passes; ++pass) {
+        options.geometry.height_mm = integrate_normals({solved.normals, calibration.view}, {}, work).height;
+        photos.rewind();
+        solved = photometric_stereo(photos, calibration.lights, options, work);
+    }
+    return solved;
 }
 
 void write_maps(const ResultFiles& files, const PhotometricStereoResult& solved, const WorkContext& work) {
@@ -64,12 +90,14 @@ void write_maps(const ResultFiles& files, const PhotometricStereoResult& solved,
 NormalsSummary run_normals(const Session& session, const NormalsOptions& options, const WorkContext& work) {
     options.stereo.validate();
     const ResultFiles files(session.folder());
-    const Lights lights = load_lights(session);
+    require_made(files.calibration, session, "calibrate");
+    const Calibration calibration = read_calibration(files.calibration).calibration;
+    const Lights& lights = calibration.lights;
     require_solvable(lights);
     NormalsSummary summary;
     Stopwatch watch;
     SessionPhotos photos(session);
-    const PhotometricStereoResult solved = photometric_stereo(photos, lights, options.stereo, work);
+    const PhotometricStereoResult solved = solve_normals(photos, calibration, options.stereo, work);
     require_any_normal(solved);
     summary.seconds.solve = solved.seconds;
     summary.seconds.read = std::max(0.0, watch.lap() - solved.seconds);
@@ -91,7 +119,8 @@ NormalsSummary run_normals(const Session& session, const NormalsOptions& options
     watch.lap();
     remove_derived(session, {"texels", "shading"});
     write_maps(files, solved, work);
-    if (options.surface) write_surface(files, solved, work);
+    for (const auto& stale : {files.height, files.surface}) std::filesystem::remove(stale);
+    if (options.surface) summary.height = write_surface(files, solved, calibration.view, work);
     summary.seconds.write = watch.lap();
     write_json(files.results_summary, to_json(summary));
     step(work, {"writing maps", 1, 1, ""});

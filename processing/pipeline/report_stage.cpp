@@ -102,11 +102,40 @@ void add_calibration(const Session& session, const ResultFiles& files, ReportCon
     content.ball = ball;
 }
 
+/// How many lights each pixel's normal rests on, and how far it may be off, where the solver says so.
+void add_confidence(const ResultFiles& files, const cv::Mat1b& valid, ReportContent& content) {
+    const cv::Mat1f used = read_exr_channel(files.confidence, "lights_used");
+    double least = 0, most = 0;
+    cv::minMaxLoc(used, &least, &most, nullptr, nullptr, valid);
+    content.pictures.push_back(
+        {heat(used, valid, std::max(most, 1.0)), "Lights used",
+         least < most ? fmt::format("Photographs behind each normal, from {:.0f} to {:.0f} (white)", least, most)
+                      : fmt::format("{:.0f} photographs behind every normal", most)});
+    const std::optional<cv::Mat1f> sigma = find_exr_channel(files.confidence, "sigma_deg");
+    if (!sigma) return;
+    cv::Mat3f grey;
+    cv::merge(std::vector<cv::Mat>{*sigma, *sigma, *sigma}, grey);
+    const double top = 1.0 / viewing_gain(grey, valid, 99.0);
+    content.pictures.push_back({heat(*sigma, valid, top), "Predicted error of the normal",
+                                fmt::format("One standard deviation of its angle; white is {:.3g}°", top)});
+}
+
+/// "12.3 mm in all, 2 parts, each about its own mean"
+std::string height_span(const ResultFiles& files, double span) {
+    if (!fs::exists(files.results_summary)) return fmt::format("{:.4g} in all", span);
+    const auto json = read_json(files.results_summary);
+    return reading_keys(files.results_summary, "a summary of a stage", [&] {
+        const auto& height = json.at("height");
+        const int parts = height.at("parts").get<int>();
+        return fmt::format("{:.4g} {} in all{}", span, height.at("unit").get<std::string>(),
+                           parts > 1 ? fmt::format("; {} parts, each about its own mean", parts) : std::string());
+    });
+}
+
 void add_normals(const ResultFiles& files, ReportContent& content) {
     const NormalMap normals = read_normal_map(files.normals);
     const AlbedoMap albedo = read_albedo_map(files.albedo, normals.valid);
     const cv::Mat1f residual = read_exr_channel(files.confidence, "residual");
-    const cv::Mat1f height = read_exr_channel(files.height, "Y");
     const double gain = viewing_gain(albedo.albedo, albedo.valid);
     content.pictures.push_back(
         {normal_colours(normals), "Normals", "Red = right, green = up, blue = towards the camera"});
@@ -118,16 +147,13 @@ void add_normals(const ResultFiles& files, ReportContent& content) {
     content.pictures.push_back(
         {heat(residual, normals.valid, top), "Residual",
          fmt::format("What the solver's law leaves unexplained; white is {:.3g} of full scale", top)});
-    const cv::Mat1f sigma = read_exr_channel(files.confidence, "sigma_deg");
-    cv::merge(std::vector<cv::Mat>{sigma, sigma, sigma}, grey);
-    const double top_deg = 1.0 / viewing_gain(grey, normals.valid, 99.0);
-    content.pictures.push_back(
-        {heat(sigma, normals.valid, top_deg), "Uncertainty",
-         fmt::format("Predicted standard deviation of the normals; white is {:.3g} degrees", top_deg)});
+    add_confidence(files, normals.valid, content);
+    if (!fs::exists(files.height)) return;
+    const cv::Mat1f height = read_exr_channel(files.height, "Y");
     double low = 0, high = 0;
     cv::minMaxLoc(height, &low, &high, nullptr, nullptr, normals.valid);
     content.pictures.push_back({heat(cv::Mat(height - low), normals.valid, std::max(high - low, 1e-6)), "Height",
-                                fmt::format("From dark (far) to white (near), {:.0f} pixels in all", high - low)});
+                                fmt::format("From dark (far) to white (near): {}", height_span(files, high - low))});
 }
 
 void add_texels(const ResultFiles& files, ReportContent& content) {
@@ -148,6 +174,15 @@ void add_summary(const fs::path& file, const std::string& stage, ReportContent& 
         content.facts.emplace_back(
             "Residual", fmt::format("{:.4g} of full scale over {} pixels", json.at("residual_rms").get<double>(),
                                     json.at("pixels").get<std::size_t>()));
+        if (json.contains("height")) {
+            const auto& height = json.at("height");
+            content.facts.emplace_back(
+                "Surface", fmt::format("heights {:.4g} to {:.4g} {}; mesh of {} vertices and {} triangles",
+                                       height.at("lowest").get<double>(), height.at("highest").get<double>(),
+                                       height.at("unit").get<std::string>(), height.at("vertices").get<std::size_t>(),
+                                       height.at("faces").get<std::size_t>()));
+            content.timings.emplace_back("normals: height", height.at("seconds").get<double>());
+        }
         if (json.contains("mean_angular_error_deg"))
             content.facts.emplace_back("Angular error", fmt::format("{:.2f}° mean against the given truth",
                                                                     json.at("mean_angular_error_deg").get<double>()));

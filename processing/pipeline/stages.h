@@ -8,6 +8,7 @@
 #include "acquisition/frame/progress.h"
 #include "acquisition/session/session.h"
 #include "processing/calibration/calibration.h"
+#include "processing/formats/ply.h"
 #include "processing/normals/photometric_stereo.h"
 #include "processing/relight/relight.h"
 #include "processing/shading/shading.h"
@@ -46,6 +47,17 @@ struct NormalsOptions {
     PhotometricStereoOptions stereo;
     bool surface = true;  ///< also integrate the height and write height.exr and surface.ply
 };
+
+/// results/height.exr (channel Y: z in the viewer frame) and results/surface.ply.
+struct HeightFacts {
+    std::string unit;  ///< "mm" where the calibration knows the scale, else "pixels"
+    double lowest = 0;
+    double highest = 0;
+    int parts = 0;  ///< connected ones, each with mean height 0
+    MeshCounts mesh;
+    double seconds = 0;  ///< of integrating
+};
+
 struct NormalsSummary {
     std::string solver;  ///< lsq or robust
     std::string body;    ///< the law of the material's body that was used
@@ -53,6 +65,7 @@ struct NormalsSummary {
     std::size_t pixels = 0;                        ///< valid
     double residual_rms = 0;                       ///< linear radiance
     std::optional<double> mean_angular_error_deg;  ///< where truth came with the pictures
+    std::optional<HeightFacts> height;  ///< none where the surface was left out
     StageSeconds seconds;
     double megapixel_images_per_second = 0;  ///< of the solver
     std::vector<std::string> warnings;

@@ -49,6 +49,12 @@ ordered_json to_json(const CalibrateSummary& summary) {
             {"seconds", seconds_json(summary.seconds)}};
 }
 
+ordered_json height_json(const HeightFacts& height) {
+    return {{"unit", height.unit},      {"lowest", height.lowest},          {"highest", height.highest},
+            {"parts", height.parts},    {"vertices", height.mesh.vertices}, {"faces", height.mesh.faces},
+            {"seconds", height.seconds}};
+}
+
 ordered_json to_json(const NormalsSummary& summary) {
     ordered_json json{{"solver", summary.solver},
                       {"body", summary.body},
@@ -58,6 +64,7 @@ ordered_json to_json(const NormalsSummary& summary) {
                       {"seconds", seconds_json(summary.seconds)},
                       {"megapixel_images_per_second", summary.megapixel_images_per_second},
                       {"warnings", summary.warnings}};
+    if (summary.height) json["height"] = height_json(*summary.height);
     if (summary.mean_angular_error_deg) json["mean_angular_error_deg"] = *summary.mean_angular_error_deg;
     return json;
 }

@@ -27,6 +27,12 @@ std::string histogram_plot(const std::vector<double>& shares) {
             static_cast<double>(i) / static_cast<double>(shares.size()),
             static_cast<double>(i + 1) / static_cast<double>(shares.size()), shares[i] * 100);
     }
+    svg += fmt::format("<line class='axis' x1='0' x2='{0}' y1='{1}' y2='{1}'/>", width, height);
+    for (const double tick : {0.25, 0.5, 0.75})
+        svg += fmt::format(
+            "<line class='axis' x1='{0:.1f}' x2='{0:.1f}' y1='{1}' y2='{2}'/><text class='tick middle' x='{0:.1f}' "
+            "y='{3}'>{4:.2f}</text>",
+            tick * width, height, height + 4, height + base - 4, tick);
     svg +=
         fmt::format("<text class='tick' x='0' y='{0}'>0</text><text class='tick end' x='{1}' y='{0}'>full scale</text>",
                     height + base - 4, width);

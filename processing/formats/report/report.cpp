@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "processing/formats/report/html.h"
 #include "processing/formats/report/plots.h"
 #include "processing/formats/report/style.h"
@@ -40,16 +42,25 @@ std::string figure_html(const std::string& svg, const char* title, const std::st
     return fmt::format("<figure>{}<figcaption><b>{}</b><span>{}</span></figcaption></figure>", svg, title, caption);
 }
 
+std::string ellipse_words(const Lights& lights, double magnification) {
+    if (std::none_of(lights.begin(), lights.end(), [](const Light& l) { return l.sigma_deg() > 0; })) return {};
+    if (magnification <= 1) return "Ellipses are one standard deviation. ";
+    return fmt::format("Ellipses are one standard deviation, magnified {:.0f} times. ", magnification);
+}
+
 std::string plots_html(const ReportContent& content) {
     std::string figures;
     if (!content.lights.empty())
         figures += figure_html(light_plot(content.lights), "Light directions",
-                               fmt::format("From the camera's point of view; circles are ten standard deviations. "
-                                           "Condition number {:.3g}.",
+                               fmt::format("As the camera sees them come; rings are degrees off its axis. {}Condition "
+                                           "number {:.3g}.",
+                                           ellipse_words(content.lights, light_plot_magnification(content.lights)),
                                            content.condition_number));
     if (content.ball)
         figures +=
-            figure_html(ball_plot(*content.ball), "Mirror ball", "Brightest of all frames, outline and highlights.");
+            figure_html(ball_plot(*content.ball, content.lights), "Mirror ball",
+                        "Brightest of all frames, outline and highlights. " +
+                            ellipse_words(content.lights, ball_plot_magnification(*content.ball, content.lights)));
     if (!content.exposure_histogram.empty())
         figures += figure_html(histogram_plot(content.exposure_histogram), "Exposure",
                                "Brightest channel of every sample on the object, all photographs; square-root scale.");

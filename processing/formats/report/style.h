@@ -37,12 +37,15 @@ tr.unused { opacity: 0.5; text-decoration: line-through; }
 .plot .grid { fill: none; stroke: var(--line); }
 .plot .tick { fill: var(--soft); font-size: 11px; }
 .plot .end { text-anchor: end; }
+.plot .middle { text-anchor: middle; }
 .plot .label { fill: var(--ink); font-size: 12px; }
 .plot .lamp { fill: var(--accent); }
 .plot .unused .lamp { fill: none; stroke: var(--soft); }
 .plot .sigma { fill: var(--accent); fill-opacity: 0.18; stroke: var(--accent); stroke-opacity: 0.5; }
 .plot .bar { fill: var(--accent); }
 .plot .outline { fill: none; stroke: #40e0ff; }
+.plot .highlight .sigma { fill: #ffb347; stroke: #ffb347; stroke-opacity: 0.9; }
+.plot .axis { stroke: var(--soft); stroke-width: 0.8; }
 .plot .highlight circle { fill: none; stroke: var(--mark); }
 )css";
 

@@ -9,7 +9,6 @@
 #include "processing/formats/calibration_file.h"
 #include "processing/formats/environment_file.h"
 #include "processing/formats/exr.h"
-#include "processing/formats/ply.h"
 #include "processing/formats/report/html.h"
 #include "processing/formats/report/report.h"
 #include "tests/support/test_data.h"
@@ -113,21 +112,6 @@ TEST(RealProbes, AreReadAsOpenCvReadsThem) {
         write_file(folder.path() / "cut.hdr", std::span(bytes).first(bytes.size() / 2));
         EXPECT_THROW(read_environment(folder.path() / "cut.hdr"), InputError);
     }
-}
-
-TEST_F(Files, PlyHasAVertexPerPixelAndTwoTrianglesPerSquare) {
-    NormalMap normals{cv::Mat3f(3, 3, cv::Vec3f(0, 0, 1)), cv::Mat1b(3, 3, uchar{255})};
-    normals.valid(0, 0) = 0;
-    const AlbedoMap albedo{cv::Mat3f(3, 3, cv::Vec3f(1, 0, 0)), normals.valid};
-    write_ply(at("s.ply"), cv::Mat1f(3, 3, 0.0F), normals, albedo);
-    const std::string ply = read_text(at("s.ply"));
-    EXPECT_THAT(ply, HasSubstr("units: pixels"));
-    EXPECT_THAT(ply, HasSubstr("element vertex 8\n"));
-    EXPECT_THAT(ply, HasSubstr("element face 6\n"));
-    const std::size_t body = ply.size() - (ply.find("end_header\n") + 11);
-    EXPECT_EQ(body, 8u * (6 * 4 + 3) + 6u * (1 + 3 * 4));
-    write_ply(at("mm.ply"), cv::Mat1f(3, 3, 0.0F), normals, albedo, 0.25);
-    EXPECT_THAT(read_text(at("mm.ply")), HasSubstr("millimetres (0.25 per pixel)"));
 }
 
 TEST(Base64, PadsAsTheStandardSays) {  // RFC 4648, section 10

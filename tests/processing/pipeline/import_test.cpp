@@ -5,6 +5,7 @@
 
 #include "processing/formats/atomic_file.h"
 #include "processing/formats/light_files.h"
+#include "processing/formats/map_files.h"
 #include "processing/formats/png.h"
 #include "processing/pipeline/export.h"
 #include "processing/pipeline/stack.h"
@@ -169,8 +170,29 @@ TEST_F(Import, RtiFolderWithLpRunsFromEndToEnd) {
     ImportOptions again;
     again.folders = {at("diligent")};
     again.out = at("again");
-    EXPECT_EQ(run_calibrate(import_photographs(again)).calibration.lights.size(), 7u);
+    const Session round = import_photographs(again);
+    EXPECT_EQ(run_calibrate(round).calibration.lights.size(), 7u);
+    run_normals(round);
+    const NormalMap before = read_normal_map(session.folder() / "results/normals.exr");
+    const NormalMap after = read_normal_map(round.folder() / "results/normals.exr");
+    EXPECT_EQ(cv::norm(before.valid, after.valid, cv::NORM_INF), 0);
+    EXPECT_LT(cv::norm(before.normal, after.normal, cv::NORM_INF), 1e-4);
     EXPECT_THAT(input_error_of([] { export_format("gif"); }), HasSubstr("'gif'"));
+}
+
+TEST_F(Import, TextureMapsAreExportedAndTheirErrorsAreClear) {
+    test::write_photographs(at("photos"), test::lamp_ring());
+    write_lights(at("photos/ring.lp"));
+    const Session session = import_photographs(plain());
+    EXPECT_THAT(input_error_of([&] { export_session(session, ExportFormat::ply, at("s.ply")); }), HasSubstr("surface"));
+    run_calibrate(session);
+    export_session(session, export_format("ptm"), at("s.ptm"));
+    export_session(session, export_format("ptm-rgb"), at("rgb.ptm"));
+    export_session(session, export_format("relight"), at("web"));
+    EXPECT_GT(fs::file_size(at("rgb.ptm")), 96u * 80u * 18u);
+    EXPECT_TRUE(fs::exists(at("web/info.json")) && fs::exists(at("web/plane_2.jpg")));
+    EXPECT_THAT(input_error_of([&] { export_session(session, ExportFormat::ptm, "/proc/none/s.ptm"); }),
+                HasSubstr("/proc/none"));
 }
 
 TEST_F(Import, TwoLightsAndCoplanarLightsAreToldByNormals) {
