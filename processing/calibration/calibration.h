@@ -43,12 +43,22 @@ struct CalibrationOptions {
     void validate() const;
 };
 
+/// Where Light::intensity comes from.
+enum class IntensityOrigin {
+    unknown,    ///< all taken as 1
+    given,      ///< came with the photographs
+    grey_card,  ///< a diffuse plane in view
+    flat,       ///< frames of a diffuse plane in the object's place
+    estimated,  ///< together with the normals
+};
+
 /// Light directions read off a mirror ball.
 struct Calibration {
     Lights lights;  ///< one per frame, in the frames' order
     std::vector<Ball> balls;
     std::vector<std::optional<Highlight>> highlights;  ///< one per frame
     std::optional<ViewGeometry> view;                  ///< where millimetres are known
+    IntensityOrigin intensity_origin = IntensityOrigin::unknown;
     double condition_number = 0;
     double contour_rms_px = 0;
     std::string method;

@@ -24,10 +24,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::vector<std::string> lamps_of(const std::vector<FrameRecord>& lit) {
-    std::vector<std::string> lamps;
-    for (const FrameRecord& frame : lit) lamps.push_back(frame.lamp_name);
-    return lamps;
+RigIdentity rig_of(const Session& session, const std::vector<FrameRecord>& lit) {
+    RigIdentity rig{session.info().rig, {}};
+    for (const FrameRecord& frame : lit) rig.lamps.push_back(frame.lamp_name);
+    return rig;
 }
 
 Calibration from_given(const GivenLights& given) {
@@ -36,6 +36,7 @@ Calibration from_given(const GivenLights& given) {
     calibration.highlights.resize(given.lights.size());
     calibration.condition_number = condition_number(given.lights);
     calibration.method = "given";
+    calibration.intensity_origin = given.intensities ? IntensityOrigin::given : IntensityOrigin::unknown;
     calibration.warnings = given.warnings;
     return calibration;
 }
@@ -43,9 +44,10 @@ Calibration from_given(const GivenLights& given) {
 /// Which stored light belongs to this lamp; by place where lamps have no names in common.
 const Light& stored_light(const StoredCalibration& stored, const FrameRecord& frame, std::size_t place,
                           const fs::path& file) {
-    const auto named = std::find(stored.lamps.begin(), stored.lamps.end(), frame.lamp_name);
-    if (!frame.lamp_name.empty() && named != stored.lamps.end())
-        return stored.calibration.lights[static_cast<std::size_t>(named - stored.lamps.begin())];
+    const std::vector<std::string>& lamps = stored.rig.lamps;
+    const auto named = std::find(lamps.begin(), lamps.end(), frame.lamp_name);
+    if (!frame.lamp_name.empty() && named != lamps.end())
+        return stored.calibration.lights[static_cast<std::size_t>(named - lamps.begin())];
     if (place >= stored.calibration.lights.size())
         throw InputError(fmt::format("{} has no light for {}", file.string(), basename_of(frame)),
                          "use a calibration of the same lamps");
@@ -63,6 +65,7 @@ Calibration from_stored(const fs::path& from, const std::vector<FrameRecord>& li
     calibration.highlights.resize(lit.size());
     calibration.condition_number = condition_number(calibration.lights);
     calibration.method = "stored: " + file.string();
+    calibration.intensity_origin = stored.calibration.intensity_origin;
     return calibration;
 }
 
@@ -157,7 +160,7 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
     }
     warn_of_few_lights(summary.calibration);
     remove_derived(session, {"results", "texels", "shading"});
-    write_calibration(files.calibration, summary.calibration, lamps_of(lit));
+    write_calibration(files.calibration, summary.calibration, rig_of(session, lit));
     write_lp(files.lights_lp, summary.calibration.lights);
     summary.seconds.write = watch.lap();
     write_json(files.calibration_summary, to_json(summary));

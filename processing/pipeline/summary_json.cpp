@@ -1,5 +1,10 @@
 #include "processing/pipeline/summary_json.h"
 
+#include <optional>
+
+#include "processing/calibration/intensity.h"
+#include "processing/calibration/light_geometry.h"
+
 namespace darkbox {
 namespace {
 
@@ -10,6 +15,16 @@ ordered_json seconds_json(const StageSeconds& seconds) {
 }
 
 ordered_json triple(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
+
+ordered_json number_or_null(const std::optional<double>& number) {
+    return number ? ordered_json(*number) : ordered_json(nullptr);
+}
+
+ordered_json geometry_json(const LightGeometry& geometry) {
+    return {{"normal_error_deg_per_percent_noise", number_or_null(geometry.noise_error_deg)},
+            {"normal_error_deg_of_directions", number_or_null(geometry.direction_error_deg)},
+            {"undetermined_share", geometry.undetermined_share}};
+}
 
 }  // namespace
 
@@ -26,7 +41,9 @@ ordered_json to_json(const CalibrateSummary& summary) {
     return {{"method", calibration.method},
             {"lights", lights},
             {"balls", balls},
+            {"intensity_origin", name(calibration.intensity_origin)},
             {"condition_number", calibration.condition_number},
+            {"light_geometry", geometry_json(light_geometry(calibration.lights))},
             {"contour_rms_px", calibration.contour_rms_px},
             {"rejected", calibration.rejected},
             {"warnings", calibration.warnings},
