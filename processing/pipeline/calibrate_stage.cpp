@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "acquisition/frame/error.h"
+#include "processing/calibration/lamp_checks.h"
 #include "processing/calibration/warnings.h"
 #include "processing/formats/calibration_file.h"
 #include "processing/formats/json_file.h"
@@ -13,6 +14,7 @@
 #include "processing/formats/png.h"
 #include "processing/pipeline/ball_picture.h"
 #include "processing/pipeline/given_lights.h"
+#include "processing/pipeline/intensities.h"
 #include "processing/pipeline/session_files.h"
 #include "processing/pipeline/stack.h"
 #include "processing/pipeline/stages.h"
@@ -154,11 +156,13 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
         const BallView view = view_of_balls(ball.frames, summary.calibration.balls);
         write_png(files.ball_picture, draw_balls(view, summary.calibration));
     }
-    if (options.from || given) {
-        leave_out(summary.calibration, options.calibration.drop);
-        append(summary.calibration.warnings, warnings_about(summary.calibration));
-    }
+    if (options.from || given) leave_out(summary.calibration, options.calibration.drop);
+    summary.calibration = with_measured_intensities(session, std::move(summary.calibration), options.grey_card, work);
+    if (options.from || given) append(summary.calibration.warnings, warnings_about(summary.calibration));
     warn_of_few_lights(summary.calibration);
+    if (options.described)
+        append(summary.calibration.warnings,
+               against_nominal(*options.described, {rig_of(session, lit), summary.calibration.lights, false}));
     remove_derived(session, {"results", "texels", "shading"});
     write_calibration(files.calibration, summary.calibration, rig_of(session, lit));
     write_lp(files.lights_lp, summary.calibration.lights);

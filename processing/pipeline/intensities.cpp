@@ -56,16 +56,16 @@ std::optional<SemiCalibratedResult> tried_on(const PhotoStack& stack, const Ligh
     }
 }
 
-std::string in_words(const SemiCalibratedResult& result) {
+std::string in_words(const SemiCalibratedResult& result, const std::string& spread) {
     return fmt::format(
-        "lamp intensities were estimated together with the normals: what Lambert's law leaves unexplained fell from "
-        "{:.1f} % to {:.1f} %",
-        100 * result.residual_equal, 100 * result.residual);
+        "{}; their intensities were estimated together with the normals: what Lambert's law leaves "
+        "unexplained fell from {:.1f} % to {:.1f} %",
+        spread, 100 * result.residual_equal, 100 * result.residual);
 }
 
 ChosenIntensities adopted(Calibration calibration, SemiCalibratedResult result) {
-    ChosenIntensities chosen{std::move(calibration), true, {in_words(result)}};
-    if (const auto spread = spread_in_words(result.lights)) chosen.warnings.front() += "; " + *spread;
+    ChosenIntensities chosen{std::move(calibration), true, {}};
+    if (const auto spread = spread_in_words(result.lights)) chosen.warnings.push_back(in_words(result, *spread));
     chosen.calibration.lights = std::move(result.lights);
     chosen.calibration.intensity_origin = IntensityOrigin::estimated;
     return chosen;
@@ -80,8 +80,7 @@ Calibration with_measured_intensities(const Session& session, Calibration calibr
     const PlaneFrames plane = read_plane(session, card ? FrameKind::lit : FrameKind::flat, work);
     GreyCard area = card ? *card : middle_of(plane.frames.front().size());
     area.view = calibration.view;
-    calibration.lights =
-        with_intensities_of_card(plane.frames, plane.clipped, std::move(calibration.lights), area);
+    calibration.lights = with_intensities_of_card(plane.frames, plane.clipped, std::move(calibration.lights), area);
     calibration.intensity_origin = card ? IntensityOrigin::grey_card : IntensityOrigin::flat;
     return calibration;
 }

@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "processing/formats/calibration_file.h"
 #include "processing/formats/exr.h"
 #include "processing/formats/json_file.h"
 #include "processing/formats/map_files.h"
@@ -53,17 +54,30 @@ void write_maps(const ResultFiles& files, const PhotometricStereoResult& solved,
     write_ply(files.surface, height, solved.normals, solved.albedo);
 }
 
+/// The calibration's lights. Intensities that had to be estimated are kept there, with their origin.
+Lights use_lights(const Session& session, const PhotoStack& stack, IntensityChoice choice, NormalsSummary& summary,
+                  const WorkContext& work) {
+    const ResultFiles files(session.folder());
+    StoredCalibration stored = read_calibration(files.calibration);
+    ChosenIntensities chosen = choose_intensities(stack, std::move(stored.calibration), choice, work);
+    if (chosen.changed) write_calibration(files.calibration, chosen.calibration, stored.rig);
+    summary.warnings = std::move(chosen.warnings);
+    summary.intensity_origin = chosen.calibration.intensity_origin;
+    summary.lights = std::move(chosen.calibration.lights);
+    return summary.lights;
+}
+
 }  // namespace
 
-NormalsSummary run_normals(const Session& session, const PhotometricStereoOptions& options, const WorkContext& work) {
+NormalsSummary run_normals(const Session& session, const NormalsOptions& options, const WorkContext& work) {
     options.validate();
     const ResultFiles files(session.folder());
-    const Lights lights = load_lights(session);
-    require_solvable(lights);
+    require_solvable(load_lights(session));
     NormalsSummary summary;
     Stopwatch watch;
     const PhotoStack stack = load_stack(session, work);
     summary.seconds.read = watch.lap();
+    const Lights lights = use_lights(session, stack, options.intensities, summary, work);
     step(work, {"solving normals", 0, 1, ""});
     const PhotometricStereoResult solved = photometric_stereo(stack, lights, options, work);
     watch.lap();

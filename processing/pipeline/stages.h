@@ -8,7 +8,10 @@
 #include "acquisition/frame/progress.h"
 #include "acquisition/session/session.h"
 #include "processing/calibration/calibration.h"
+#include "processing/calibration/drift.h"
+#include "processing/calibration/intensity.h"
 #include "processing/normals/photometric_stereo.h"
+#include "processing/pipeline/intensities.h"
 #include "processing/relight/relight.h"
 #include "processing/shading/shading.h"
 #include "processing/texels/texels.h"
@@ -27,18 +30,27 @@ struct StageSeconds {
 struct CalibrateOptions {
     CalibrationOptions calibration;
     std::optional<std::filesystem::path> from;  ///< a lights.json, or a session that has one: its lights are reused
+    std::optional<GreyCard> grey_card;          ///< in view in the lit frames: tells intensities
+    std::optional<RigLights> described;         ///< where the rig's description has the lamps; for warnings
 };
 struct CalibrateSummary {
     Calibration calibration;
     StageSeconds seconds;
 };
-/// Writes calibration/lights.json, lights.lp, ball.png. Lights that came with the pictures are taken as they are
-/// (method "given") unless a ball is given or `from` is set.
+/// Writes calibration/lights.json, lights.lp, ball.png. Intensities are measured where a grey card or flat frames
+/// allow. Lights that came with the pictures are taken as they are (method "given") unless a ball is given or `from` is
+/// set.
 CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& options = {},
                                const WorkContext& work = {});
 
+/// The solver's own options, and what the stage decides before it.
+struct NormalsOptions : PhotometricStereoOptions {
+    IntensityChoice intensities = IntensityChoice::automatic;
+};
 struct NormalsSummary {
     std::string solver;
+    IntensityOrigin intensity_origin = IntensityOrigin::unknown;  ///< of the lights that were used
+    Lights lights;                                                ///< the lights that were used
     std::size_t images = 0;
     std::size_t pixels = 0;                        ///< valid
     double residual_rms = 0;                       ///< linear radiance
@@ -48,9 +60,8 @@ struct NormalsSummary {
     std::vector<std::string> warnings;
 };
 /// Writes results/normals.exr, normals.png, albedo.exr, albedo.png, confidence.exr (lights used, residual), height.exr,
-/// surface.ply.
-NormalsSummary run_normals(const Session& session, const PhotometricStereoOptions& options = {},
-                           const WorkContext& work = {});
+/// surface.ply. Intensities that are estimated here go into calibration/lights.json, where later stages find them.
+NormalsSummary run_normals(const Session& session, const NormalsOptions& options = {}, const WorkContext& work = {});
 
 struct TexelsSummary {
     int texels = 0;
@@ -81,7 +92,7 @@ ReportSummary run_report(const Session& session, const WorkContext& work = {});
 
 struct ProcessOptions {
     CalibrateOptions calibrate;
-    PhotometricStereoOptions normals;
+    NormalsOptions normals;
     TexelOptions texels;
     ShadingOptions shading;
 };

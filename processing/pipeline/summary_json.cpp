@@ -51,7 +51,12 @@ ordered_json to_json(const CalibrateSummary& summary) {
 }
 
 ordered_json to_json(const NormalsSummary& summary) {
+    ordered_json intensities = ordered_json::array();
+    for (const Light& light : summary.lights)
+        intensities.push_back({{"file", light.file}, {"intensity", triple(light.intensity)}});
     ordered_json json{{"solver", summary.solver},
+                      {"intensity_origin", name(summary.intensity_origin)},
+                      {"intensities", intensities},
                       {"images", summary.images},
                       {"pixels", summary.pixels},
                       {"residual_rms", summary.residual_rms},

@@ -6,6 +6,7 @@
 #include "processing/pipeline/summary_json.h"
 #include "rig/cli/arguments.h"
 #include "rig/cli/commands.h"
+#include "rig/cli/described_lamps.h"
 
 namespace darkbox {
 namespace {
@@ -16,6 +17,7 @@ struct Arguments {
     std::string ball;
     std::filesystem::path from;
     std::vector<std::string> highlights;
+    std::string grey_card;
 };
 
 /// The arguments as options, and those that need parsing parsed.
@@ -25,6 +27,8 @@ ProcessOptions options_of(const Arguments& arguments) {
     if (!arguments.ball.empty()) calibration.ball = parse_ball(arguments.ball);
     if (!arguments.from.empty()) options.calibrate.from = arguments.from;
     for (const std::string& text : arguments.highlights) calibration.highlights.push_back(parse_highlight(text));
+    if (!arguments.grey_card.empty()) options.calibrate.grey_card = parse_grey_card(arguments.grey_card);
+    options.calibrate.described = described_lamps(arguments.session);
     return options;
 }
 
@@ -42,6 +46,7 @@ std::string describe(const NormalsSummary& summary) {
     std::string text =
         fmt::format("{} pixels from {} photographs ({}), residual {:.4f} of full scale, {:.2f} s", summary.pixels,
                     summary.images, summary.solver, summary.residual_rms, summary.seconds.solve);
+    if (summary.intensity_origin == IntensityOrigin::estimated) text += "\nwith estimated lamp intensities";
     if (summary.mean_angular_error_deg)
         text += fmt::format("\nmean angular error against the truth that came with the pictures: {:.2f} degrees",
                             *summary.mean_angular_error_deg);
@@ -91,6 +96,8 @@ void add_calibrate_options(CLI::App& command, Arguments& a) {
     command.add_option("--ball", a.ball, "The ball's outline, pixels: X,Y,R (else it is found)");
     command.add_option("--drop", calibration.drop, "Frames to leave out");
     command.add_option("--highlight", a.highlights, "A highlight read by hand: FRAME=X,Y");
+    command.add_option("--grey-card", a.grey_card,
+                       "A diffuse grey card that faces the camera in the photographs, pixels: X,Y,WIDTH,HEIGHT");
     command.add_option("--from", a.from, "Reuse the lights of this lights.json or session");
     const std::map<std::string, CalibrationMethod> methods{{"refined", CalibrationMethod::refined},
                                                            {"brightest", CalibrationMethod::brightest}};
@@ -102,6 +109,14 @@ void add_normals_options(CLI::App& command, Arguments& a) {
     const std::map<std::string, Solver> solvers{{"lsq", Solver::lsq}};
     command.add_option("--solver", a.options.normals.solver, "lsq: least squares over all lights")
         ->transform(CLI::CheckedTransformer(solvers).description("{lsq}"));
+    const std::map<std::string, IntensityChoice> choices{{"auto", IntensityChoice::automatic},
+                                                         {"given", IntensityChoice::given},
+                                                         {"estimate", IntensityChoice::estimate}};
+    command
+        .add_option("--intensities", a.options.normals.intensities,
+                    "given: as calibrated; estimate: with the normals; auto: estimated where nothing is known of them "
+                    "and the photographs clearly ask for it")
+        ->transform(CLI::CheckedTransformer(choices).description("{auto,given,estimate}"));
 }
 
 void add_texels_options(CLI::App& command, Arguments& a) {
