@@ -61,7 +61,9 @@ std::vector<std::string> warnings_about(const Calibration& calibration) {
     warn_of_lights_behind(calibration.lights, warnings);
     warn_of_duplicates(calibration.lights, warnings);
     warn_of_outline(calibration, warnings);
-    if (calibration.intensity_origin != IntensityOrigin::unknown)
+    const bool measured = calibration.intensity_origin == IntensityOrigin::grey_card ||
+                          calibration.intensity_origin == IntensityOrigin::flat;
+    if (measured)  // who gives intensities knows them
         for (std::string& words : weak_lamps(calibration.lights)) warnings.push_back(std::move(words));
     return warnings;
 }
