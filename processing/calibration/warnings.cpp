@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "processing/calibration/lamp_checks.h"
 #include "processing/calibration/light_geometry.h"
 
 namespace darkbox {
@@ -61,10 +60,6 @@ std::vector<std::string> warnings_about(const Calibration& calibration) {
     warn_of_lights_behind(calibration.lights, warnings);
     warn_of_duplicates(calibration.lights, warnings);
     warn_of_outline(calibration, warnings);
-    const bool measured = calibration.intensity_origin == IntensityOrigin::grey_card ||
-                          calibration.intensity_origin == IntensityOrigin::flat;
-    if (measured)  // who gives intensities knows them
-        for (std::string& words : weak_lamps(calibration.lights)) warnings.push_back(std::move(words));
     return warnings;
 }
 

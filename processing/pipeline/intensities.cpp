@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "acquisition/frame/error.h"
+#include "processing/calibration/lamp_checks.h"
 #include "processing/normals/semi_calibrated.h"
 #include "processing/pipeline/radiance.h"
 #include "processing/pipeline/session_files.h"
@@ -82,6 +83,7 @@ Calibration with_measured_intensities(const Session& session, Calibration calibr
     area.view = calibration.view;
     calibration.lights = with_intensities_of_card(plane.frames, plane.clipped, std::move(calibration.lights), area);
     calibration.intensity_origin = card ? IntensityOrigin::grey_card : IntensityOrigin::flat;
+    for (std::string& words : weak_lamps(calibration.lights)) calibration.warnings.push_back(std::move(words));
     return calibration;
 }
 
