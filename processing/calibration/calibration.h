@@ -78,6 +78,15 @@ struct CalibrationOptions {
     void validate() const;
 };
 
+/// Where Light::intensity comes from.
+enum class IntensityOrigin {
+    unknown,    ///< all taken as 1
+    given,      ///< came with the photographs
+    grey_card,  ///< a diffuse plane in view
+    flat,       ///< frames of a diffuse plane in the object's place
+    estimated,  ///< together with the normals
+};
+
 /// Lights read off one or more mirror balls.
 struct Calibration {
     Lights lights;                                                ///< one per frame, in the frames' order
@@ -85,6 +94,7 @@ struct Calibration {
     std::vector<std::optional<Highlight>> highlights;             ///< one per frame, on the first ball that shows one
     std::vector<std::vector<std::optional<Highlight>>> readings;  ///< [ball][frame]
     std::optional<ViewGeometry> view;                             ///< where millimetres are known
+    IntensityOrigin intensity_origin = IntensityOrigin::unknown;
     double condition_number = 0;
     double contour_rms_px = 0;
     std::string method;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "processing/calibration/light_geometry.h"
+
 namespace darkbox {
 namespace {
 
@@ -12,10 +14,8 @@ constexpr double thin_support = 0.3;
 
 void warn_of_geometry(const Calibration& calibration, std::vector<std::string>& warnings) {
     if (direction_matrix(calibration.lights).rows() >= 3 && calibration.condition_number > poor_condition)
-        warnings.push_back(fmt::format(
-            "the lights nearly lie in one plane (condition number {:.0f}): errors across that plane grow by "
-            "about that factor",
-            calibration.condition_number));
+        warnings.push_back(fmt::format("the lights nearly lie in one plane (condition number {:.0f}): {}",
+                                       calibration.condition_number, in_words(light_geometry(calibration.lights))));
 }
 
 void warn_of_lights_behind(const Lights& lights, std::vector<std::string>& warnings) {

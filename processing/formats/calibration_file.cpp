@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "processing/calibration/intensity.h"
 #include "processing/formats/json_file.h"
 
 namespace darkbox {
@@ -113,6 +114,12 @@ void read_readings(const json& light, Calibration& calibration) {
     for (std::size_t b = 0; b < of_balls.size(); ++b) calibration.readings[b].push_back(highlight_in(of_balls.at(b)));
 }
 
+/// Files of earlier versions do not say.
+IntensityOrigin origin_in(const json& j) {
+    const std::string origin = j.value("intensity_origin", name(IntensityOrigin::unknown));
+    return intensity_origin_from_name(origin).value_or(IntensityOrigin::unknown);
+}
+
 StoredCalibration calibration_in(const json& j) {
     StoredCalibration stored;
     Calibration& calibration = stored.calibration;
@@ -120,8 +127,10 @@ StoredCalibration calibration_in(const json& j) {
         calibration.lights.push_back(light_in(light));
         calibration.highlights.push_back(highlight_in(light.value("highlight", json())));
         read_readings(light, calibration);
-        stored.lamps.push_back(light.value("lamp", ""));
+        stored.rig.lamps.push_back(light.value("lamp", ""));
     }
+    stored.rig.name = j.value("rig", "");
+    calibration.intensity_origin = origin_in(j);
     for (const json& ball : j.at("balls")) calibration.balls.push_back(ball_in(ball));
     if (calibration.readings.empty()) calibration.readings = {calibration.highlights};
     if (j.contains("view")) calibration.view = view_in(j.at("view"));
@@ -137,17 +146,19 @@ StoredCalibration calibration_in(const json& j) {
 
 }  // namespace
 
-void write_calibration(const fs::path& path, const Calibration& calibration, const std::vector<std::string>& lamps) {
+void write_calibration(const fs::path& path, const Calibration& calibration, const RigIdentity& rig) {
     ordered_json lights = ordered_json::array(), balls = ordered_json::array();
     for (std::size_t i = 0; i < calibration.lights.size(); ++i)
-        lights.push_back(light_json(calibration.lights[i], i < lamps.size() ? lamps[i] : "",
+        lights.push_back(light_json(calibration.lights[i], i < rig.lamps.size() ? rig.lamps[i] : "",
                                     i < calibration.highlights.size() ? calibration.highlights[i] : std::nullopt));
     for (const Ball& ball : calibration.balls) balls.push_back(ball_json(ball));
     if (calibration.readings.size() > 1)
         for (std::size_t i = 0; i < lights.size(); ++i)
             for (const auto& ball : calibration.readings) lights[i]["highlights"].push_back(highlight_json(ball[i]));
     ordered_json j{{"frame", "viewer: x right, y up, z from the object to the camera; pixels: u right, v down"},
+                   {"rig", rig.name},
                    {"method", calibration.method},
+                   {"intensity_origin", name(calibration.intensity_origin)},
                    {"condition_number", calibration.condition_number},  // infinity becomes null
                    {"contour_rms_px", calibration.contour_rms_px},
                    {"balls", balls},

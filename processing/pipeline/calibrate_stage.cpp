@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "acquisition/frame/error.h"
+#include "processing/calibration/lamp_checks.h"
 #include "processing/calibration/warnings.h"
 #include "processing/formats/calibration_file.h"
 #include "processing/formats/json_file.h"
@@ -13,6 +14,7 @@
 #include "processing/formats/png.h"
 #include "processing/pipeline/ball_picture.h"
 #include "processing/pipeline/given_lights.h"
+#include "processing/pipeline/intensities.h"
 #include "processing/pipeline/session_files.h"
 #include "processing/pipeline/session_geometry.h"
 #include "processing/pipeline/stack.h"
@@ -25,10 +27,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::vector<std::string> lamps_of(const std::vector<FrameRecord>& lit) {
-    std::vector<std::string> lamps;
-    for (const FrameRecord& frame : lit) lamps.push_back(frame.lamp_name);
-    return lamps;
+RigIdentity rig_of(const Session& session, const std::vector<FrameRecord>& lit) {
+    RigIdentity rig{session.info().rig, {}};
+    for (const FrameRecord& frame : lit) rig.lamps.push_back(frame.lamp_name);
+    return rig;
 }
 
 Calibration from_given(const GivenLights& given) {
@@ -37,6 +39,7 @@ Calibration from_given(const GivenLights& given) {
     calibration.highlights.resize(given.lights.size());
     calibration.condition_number = condition_number(given.lights);
     calibration.method = "given";
+    calibration.intensity_origin = given.intensities ? IntensityOrigin::given : IntensityOrigin::unknown;
     calibration.warnings = given.warnings;
     return calibration;
 }
@@ -44,9 +47,10 @@ Calibration from_given(const GivenLights& given) {
 /// Which stored light belongs to this lamp; by place where lamps have no names in common.
 const Light& stored_light(const StoredCalibration& stored, const FrameRecord& frame, std::size_t place,
                           const fs::path& file) {
-    const auto named = std::find(stored.lamps.begin(), stored.lamps.end(), frame.lamp_name);
-    if (!frame.lamp_name.empty() && named != stored.lamps.end())
-        return stored.calibration.lights[static_cast<std::size_t>(named - stored.lamps.begin())];
+    const std::vector<std::string>& lamps = stored.rig.lamps;
+    const auto named = std::find(lamps.begin(), lamps.end(), frame.lamp_name);
+    if (!frame.lamp_name.empty() && named != lamps.end())
+        return stored.calibration.lights[static_cast<std::size_t>(named - lamps.begin())];
     if (place >= stored.calibration.lights.size())
         throw InputError(fmt::format("{} has no light for {}", file.string(), basename_of(frame)),
                          "use a calibration of the same lamps");
@@ -65,6 +69,7 @@ Calibration from_stored(const fs::path& from, const std::vector<FrameRecord>& li
     calibration.view = stored.calibration.view;
     calibration.condition_number = condition_number(calibration.lights);
     calibration.method = "stored: " + file.string();
+    calibration.intensity_origin = stored.calibration.intensity_origin;
     return calibration;
 }
 
@@ -165,13 +170,15 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
         const BallView view = view_of_balls(ball.frames, summary.calibration.balls);
         write_png(files.ball_picture, draw_balls(view, summary.calibration));
     }
-    if (options.from || given) {
-        leave_out(summary.calibration, options.calibration.drop);
-        append(summary.calibration.warnings, warnings_about(summary.calibration));
-    }
+    if (options.from || given) leave_out(summary.calibration, options.calibration.drop);
+    summary.calibration = with_measured_intensities(session, std::move(summary.calibration), options.grey_card, work);
+    if (options.from || given) append(summary.calibration.warnings, warnings_about(summary.calibration));
     warn_of_few_lights(summary.calibration);
+    if (options.described)
+        append(summary.calibration.warnings,
+               against_nominal(*options.described, {rig_of(session, lit), summary.calibration.lights, false}));
     remove_derived(session, {"results", "texels", "shading"});
-    write_calibration(files.calibration, summary.calibration, lamps_of(lit));
+    write_calibration(files.calibration, summary.calibration, rig_of(session, lit));
     write_lp(files.lights_lp, summary.calibration.lights);
     summary.seconds.write = watch.lap();
     write_json(files.calibration_summary, to_json(summary));

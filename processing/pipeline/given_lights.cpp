@@ -48,7 +48,7 @@ void apply_intensities(Lights& lights, const fs::path& path) {
 GivenLights lights_for(const std::vector<std::string>& files, const fs::path& path,
                        const std::optional<fs::path>& intensities) {
     const LightFile file = read_lights(path);
-    GivenLights given{file.lights, file.warnings};
+    GivenLights given{file.lights, file.warnings, intensities.has_value()};
     if (intensities) apply_intensities(given.lights, *intensities);
     if (file.form == LightFileForm::lp) given.lights = by_name(given.lights, files, path);
     if (given.lights.size() != files.size())

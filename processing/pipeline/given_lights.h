@@ -13,6 +13,7 @@ namespace darkbox {
 struct GivenLights {
     Lights lights;  ///< one per file, named after it
     std::vector<std::string> warnings;
+    bool intensities = false;  ///< came with the pictures too
 };
 
 /// Lights from a file for these photographs: by name where the file has names that fit, else in order. Throws

@@ -91,14 +91,25 @@ NormalsSummary run_normals(const Session& session, const NormalsOptions& options
     options.stereo.validate();
     const ResultFiles files(session.folder());
     require_made(files.calibration, session, "calibrate");
-    const Calibration calibration = read_calibration(files.calibration).calibration;
-    const Lights& lights = calibration.lights;
-    require_solvable(lights);
+    StoredCalibration stored = read_calibration(files.calibration);
+    require_solvable(stored.calibration.lights);
     NormalsSummary summary;
     Stopwatch watch;
     SessionPhotos photos(session);
-    const PhotometricStereoResult solved = solve_normals(photos, calibration, options.stereo, work);
+    PhotometricStereoResult solved = solve_normals(photos, stored.calibration, options.stereo, work);
     require_any_normal(solved);
+    const ChosenIntensities chosen =
+        choose_intensities(photos.kept_stack(), std::move(stored.calibration), options.intensities, work);
+    const Calibration& calibration = chosen.calibration;
+    const Lights& lights = calibration.lights;
+    if (chosen.changed) {  // later stages find the estimate in the calibration
+        write_calibration(files.calibration, calibration, stored.rig);
+        photos.rewind();
+        solved = solve_normals(photos, calibration, options.stereo, work);
+    }
+    summary.warnings = chosen.warnings;
+    summary.intensity_origin = calibration.intensity_origin;
+    summary.lights = lights;
     summary.seconds.solve = solved.seconds;
     summary.seconds.read = std::max(0.0, watch.lap() - solved.seconds);
     summary.solver = name(options.stereo.solver);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "processing/calibration/intensity.h"
+#include "processing/calibration/light_geometry.h"
 #include "processing/formats/atomic_file.h"
 #include "processing/formats/calibration_file.h"
 #include "processing/formats/exr.h"
@@ -83,6 +85,8 @@ void add_calibration(const Session& session, const ResultFiles& files, ReportCon
     content.facts.emplace_back(
         "Lights", fmt::format("{}, {} of {} used", calibration.method, direction_matrix(calibration.lights).rows(),
                               calibration.lights.size()));
+    content.facts.emplace_back("Light geometry", in_words(light_geometry(calibration.lights)));
+    content.facts.emplace_back("Intensities", name(calibration.intensity_origin));
     for (const std::string& rejected : calibration.rejected) content.facts.emplace_back("Left out", rejected);
     if (calibration.balls.empty()) return;
     const BallView view = view_of_balls(load_ball_frames(session, work).frames, calibration.balls);

@@ -8,8 +8,11 @@
 #include "acquisition/frame/progress.h"
 #include "acquisition/session/session.h"
 #include "processing/calibration/calibration.h"
+#include "processing/calibration/drift.h"
+#include "processing/calibration/intensity.h"
 #include "processing/formats/ply.h"
 #include "processing/normals/photometric_stereo.h"
+#include "processing/pipeline/intensities.h"
 #include "processing/relight/relight.h"
 #include "processing/shading/shading.h"
 #include "processing/texels/texels.h"
@@ -31,6 +34,8 @@ struct CalibrateOptions {
     CalibrationOptions calibration;
     std::optional<std::filesystem::path> ball_mask;  ///< a picture that is white on the ball or balls
     std::optional<std::filesystem::path> from;  ///< a lights.json, or a session that has one: its lights are reused
+    std::optional<GreyCard> grey_card;          ///< in view in the lit frames: tells intensities
+    std::optional<RigLights> described;         ///< where the rig's description has the lamps; for warnings
 };
 struct CalibrateSummary {
     Calibration calibration;
@@ -38,13 +43,14 @@ struct CalibrateSummary {
 };
 /// Writes calibration/lights.json, lights.lp, ball.png. What the session knows of the rig's geometry serves where the
 /// options leave it open; directions of near lamps hold at the object's centroid (its mask's, where there is one, else
-/// the picture's centre). Lights that came with the pictures are taken as they are
-/// (method "given") unless a ball is given or `from` is set.
+/// the picture's centre). Intensities are measured where a grey card or flat frames allow. Lights that came with the
+/// pictures are taken as they are (method "given") unless a ball is given or `from` is set.
 CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& options = {},
                                const WorkContext& work = {});
 
 struct NormalsOptions {
     PhotometricStereoOptions stereo;
+    IntensityChoice intensities = IntensityChoice::automatic;
     bool surface = true;  ///< also integrate the height and write height.exr and surface.ply
 };
 
@@ -59,19 +65,22 @@ struct HeightFacts {
 };
 
 struct NormalsSummary {
-    std::string solver;  ///< lsq or robust
-    std::string body;    ///< the law of the material's body that was used
+    std::string solver;                                           ///< lsq or robust
+    std::string body;                                             ///< the law of the material's body that was used
+    IntensityOrigin intensity_origin = IntensityOrigin::unknown;  ///< of the lights that were used
+    Lights lights;                                                ///< the lights that were used
     std::size_t images = 0;
     std::size_t pixels = 0;                        ///< valid
     double residual_rms = 0;                       ///< linear radiance
     std::optional<double> mean_angular_error_deg;  ///< where truth came with the pictures
-    std::optional<HeightFacts> height;  ///< none where the surface was left out
+    std::optional<HeightFacts> height;             ///< none where the surface was left out
     StageSeconds seconds;
     double megapixel_images_per_second = 0;  ///< of the solver
     std::vector<std::string> warnings;
 };
 /// Writes results/normals.exr, normals.png, albedo.exr, albedo.png, confidence.exr (lights used, residual, predicted
-/// standard deviation in degrees), height.exr, surface.ply.
+/// standard deviation in degrees), height.exr, surface.ply. Intensities that are estimated here go into
+/// calibration/lights.json, where later stages find them.
 NormalsSummary run_normals(const Session& session, const NormalsOptions& options = {}, const WorkContext& work = {});
 
 struct TexelsSummary {

@@ -1,6 +1,10 @@
 #include "processing/pipeline/summary_json.h"
 
 #include <numbers>
+#include <optional>
+
+#include "processing/calibration/intensity.h"
+#include "processing/calibration/light_geometry.h"
 
 namespace darkbox {
 namespace {
@@ -32,6 +36,16 @@ ordered_json ball_json(const Ball& ball) {
     return json;
 }
 
+ordered_json number_or_null(const std::optional<double>& number) {
+    return number ? ordered_json(*number) : ordered_json(nullptr);
+}
+
+ordered_json geometry_json(const LightGeometry& geometry) {
+    return {{"normal_error_deg_per_percent_noise", number_or_null(geometry.noise_error_deg)},
+            {"normal_error_deg_of_directions", number_or_null(geometry.direction_error_deg)},
+            {"undetermined_share", geometry.undetermined_share}};
+}
+
 }  // namespace
 
 ordered_json to_json(const CalibrateSummary& summary) {
@@ -42,7 +56,9 @@ ordered_json to_json(const CalibrateSummary& summary) {
     return {{"method", calibration.method},
             {"lights", lights},
             {"balls", balls},
+            {"intensity_origin", name(calibration.intensity_origin)},
             {"condition_number", calibration.condition_number},
+            {"light_geometry", geometry_json(light_geometry(calibration.lights))},
             {"contour_rms_px", calibration.contour_rms_px},
             {"rejected", calibration.rejected},
             {"warnings", calibration.warnings},
@@ -56,8 +72,13 @@ ordered_json height_json(const HeightFacts& height) {
 }
 
 ordered_json to_json(const NormalsSummary& summary) {
+    ordered_json intensities = ordered_json::array();
+    for (const Light& light : summary.lights)
+        intensities.push_back({{"file", light.file}, {"intensity", triple(light.intensity)}});
     ordered_json json{{"solver", summary.solver},
                       {"body", summary.body},
+                      {"intensity_origin", name(summary.intensity_origin)},
+                      {"intensities", intensities},
                       {"images", summary.images},
                       {"pixels", summary.pixels},
                       {"residual_rms", summary.residual_rms},

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -44,6 +45,16 @@ std::vector<double> parse_numbers(const std::string& option, const std::string& 
 Ball parse_ball(const std::string& text) {
     const auto n = parse_numbers("--ball", text, 3);
     return {n[0], n[1], n[2], 1.0};
+}
+
+GreyCard parse_grey_card(const std::string& text) {
+    const auto n = parse_numbers("--grey-card", text, 4);
+    if (!std::all_of(n.begin(), n.end(), [](double v) { return v >= 0 && v < 1e6 && v == std::floor(v); }))
+        malformed("--grey-card", text, "X,Y,WIDTH,HEIGHT in whole pixels");
+    GreyCard card;
+    card.area = {static_cast<int>(n[0]), static_cast<int>(n[1]), static_cast<int>(n[2]), static_cast<int>(n[3])};
+    card.validate();
+    return card;
 }
 
 std::pair<std::string, cv::Point2d> parse_highlight(const std::string& text) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "processing/calibration/calibration.h"
+#include "processing/calibration/intensity.h"
 #include "processing/maps/lights.h"
 
 namespace darkbox {
@@ -20,6 +21,9 @@ std::vector<double> parse_numbers(const std::string& option, const std::string& 
 
 /// "X,Y,R" in pixels.
 Ball parse_ball(const std::string& text);
+
+/// "X,Y,WIDTH,HEIGHT" in whole pixels.
+GreyCard parse_grey_card(const std::string& text);
 
 /// "FRAME=X,Y".
 std::pair<std::string, cv::Point2d> parse_highlight(const std::string& text);

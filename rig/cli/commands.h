@@ -11,6 +11,7 @@ void add_stage_commands(CommandLine& line);  ///< calibrate, normals, texels, sh
 void add_relight_command(CommandLine& line);
 void add_transfer_command(CommandLine& line);
 void add_evaluate_command(CommandLine& line);
+void add_drift_command(CommandLine& line);
 void add_session_commands(CommandLine& line);  ///< verify, export
 
 }  // namespace darkbox

@@ -152,6 +152,8 @@ void add_rig_commands(CommandLine& line) {
                                               "darkbox rig check --rig rig.toml", rig_check);
     check.add_option("--rig", check_arguments->rig, "The rig's description")->required();
 
+    add_rig_plan_command(line, rig);
+
     CLI::App& lamps = line.add_group("lamps", "The lamps of the rig");
     add_to_daemon(line, lamps, "list", "Names and places of the lamps", "darkbox lamps list", lamps_list);
     add_to_daemon(line, lamps, "dark", "Darken every lamp; a running capture is cancelled", "darkbox lamps dark",

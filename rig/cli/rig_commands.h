@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -12,6 +13,12 @@ namespace darkbox {
 void add_capture_command(CommandLine& line);
 /// `darkbox rig`, `darkbox lamps` and `darkbox sessions`.
 void add_rig_commands(CommandLine& line);
+
+/// `darkbox rig plan`, into the group `rig`.
+void add_rig_plan_command(CommandLine& line, CLI::App& rig);
+
+/// [[lamps.lamp]] sections of a rig.toml, lamp-01 on channel 0 and so on. Positions in the rig frame, mm.
+std::string lamps_toml(const std::vector<Eigen::Vector3d>& positions_mm);
 
 /// "all" is no name at all; else names between commas. Throws InputError for an empty name.
 std::vector<std::string> lamps_of_plan(const std::string& plan);

@@ -7,6 +7,7 @@
 #include "processing/pipeline/summary_json.h"
 #include "rig/cli/arguments.h"
 #include "rig/cli/commands.h"
+#include "rig/cli/described_lamps.h"
 
 namespace darkbox {
 namespace {
@@ -18,6 +19,7 @@ struct Arguments {
     std::filesystem::path ball_mask;
     std::filesystem::path from;
     std::vector<std::string> highlights;
+    std::string grey_card;
 };
 
 /// The arguments as options, and those that need parsing parsed.
@@ -28,6 +30,8 @@ ProcessOptions options_of(const Arguments& arguments) {
     if (!arguments.ball_mask.empty()) options.calibrate.ball_mask = arguments.ball_mask;
     if (!arguments.from.empty()) options.calibrate.from = arguments.from;
     for (const std::string& text : arguments.highlights) calibration.highlights.push_back(parse_highlight(text));
+    if (!arguments.grey_card.empty()) options.calibrate.grey_card = parse_grey_card(arguments.grey_card);
+    options.calibrate.described = described_lamps(arguments.session);
     return options;
 }
 
@@ -48,6 +52,7 @@ std::string describe(const NormalsSummary& summary) {
         fmt::format("{} pixels from {} photographs ({}), residual {:.4f} of full scale, {:.2f} s", summary.pixels,
                     summary.images, summary.solver, summary.residual_rms, summary.seconds.solve);
     if (summary.body != "lambert") text += fmt::format("\nthe material's body follows the law '{}'", summary.body);
+    if (summary.intensity_origin == IntensityOrigin::estimated) text += "\nwith estimated lamp intensities";
     if (summary.mean_angular_error_deg)
         text += fmt::format("\nmean angular error against the truth that came with the pictures: {:.2f} degrees",
                             *summary.mean_angular_error_deg);
@@ -103,6 +108,8 @@ void add_calibrate_options(CLI::App& command, Arguments& a) {
         ->transform(CLI::CheckedTransformer(models).description("{auto,distant,near}"));
     command.add_option("--drop", calibration.drop, "Frames to leave out");
     command.add_option("--highlight", a.highlights, "A highlight read by hand: FRAME=X,Y");
+    command.add_option("--grey-card", a.grey_card,
+                       "A diffuse grey card that faces the camera in the photographs, pixels: X,Y,WIDTH,HEIGHT");
     command.add_option("--from", a.from, "Reuse the lights of this lights.json or session");
     const std::map<std::string, CalibrationMethod> methods{{"refined", CalibrationMethod::refined},
                                                            {"brightest", CalibrationMethod::brightest}};
@@ -122,6 +129,14 @@ void add_normals_options(CLI::App& command, Arguments& a) {
                     "Memory for photographs and maps while solving")
         ->capture_default_str();
     command.add_flag("!--no-surface", a.options.normals.surface, "Leave out height.exr and surface.ply");
+    const std::map<std::string, IntensityChoice> choices{{"auto", IntensityChoice::automatic},
+                                                         {"given", IntensityChoice::given},
+                                                         {"estimate", IntensityChoice::estimate}};
+    command
+        .add_option("--intensities", a.options.normals.intensities,
+                    "given: as calibrated; estimate: with the normals; auto: estimated where nothing is known of them "
+                    "and the photographs clearly ask for it")
+        ->transform(CLI::CheckedTransformer(choices).description("{auto,given,estimate}"));
 }
 
 void add_texels_options(CLI::App& command, Arguments& a) {

@@ -1,4 +1,4 @@
-#include "processing/calibration/nominal.h"
+#include "processing/calibration/lamp_checks.h"
 
 #include <fmt/format.h>
 

@@ -1,0 +1,125 @@
+#include "processing/calibration/intensity.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "acquisition/frame/error.h"
+
+namespace darkbox {
+namespace {
+
+constexpr std::array<std::pair<IntensityOrigin, const char*>, 5> names{{{IntensityOrigin::unknown, "unknown"},
+                                                                        {IntensityOrigin::given, "given"},
+                                                                        {IntensityOrigin::grey_card, "grey card"},
+                                                                        {IntensityOrigin::flat, "flat"},
+                                                                        {IntensityOrigin::estimated, "estimated"}}};
+constexpr double least_cosine = 0.1;         // a light that grazes the card says little of its intensity
+constexpr double most_clipped_share = 0.01;  // of the card's pixels
+constexpr double noticeable_spread = 1.5;
+
+const char* remedy = "move the card, name another area, or leave that frame out";
+
+void require_in_picture(const GreyCard& card, cv::Size size) {
+    if ((card.area & cv::Rect({0, 0}, size)) != card.area)
+        throw InputError(
+            fmt::format("the grey card at {},{} of {}x{} pixels is not inside the picture of {}x{}", card.area.x,
+                        card.area.y, card.area.width, card.area.height, size.width, size.height),
+            "give the card's area as X,Y,WIDTH,HEIGHT in pixels");
+}
+
+/// Mean of n.L times fall-off over the card: what a light of intensity 1 would make of it, albedo aside.
+double expected(const Light& light, const GreyCard& card) {
+    if (!light.near || !card.view) return std::max(0.0, card.normal.dot(light.direction));
+    double sum = 0;
+    for (int y = card.area.y; y < card.area.y + card.area.height; ++y)
+        for (int x = card.area.x; x < card.area.x + card.area.width; ++x) {
+            const Incidence at = incidence(light, card.view->point_at(cv::Point2d(x, y), card.height_mm));
+            sum += std::max(0.0, card.normal.dot(at.direction)) * at.falloff;
+        }
+    return sum / card.area.area();
+}
+
+Eigen::Vector3d intensity_of(const cv::Mat3f& frame, const cv::Mat1b& clipped, const Light& light,
+                             const GreyCard& card) {
+    const double geometry = expected(light, card);
+    if (geometry < least_cosine)
+        throw InputError(
+            fmt::format("the light of {} hardly reaches the grey card: n.L is {:.2f}", light.file, geometry), remedy);
+    if (cv::countNonZero(clipped(card.area)) > most_clipped_share * card.area.area())
+        throw InputError(fmt::format("the grey card is clipped in {}", light.file), "expose it less");
+    const cv::Scalar mean = cv::mean(frame(card.area));
+    const Eigen::Vector3d intensity = Eigen::Vector3d(mean[0], mean[1], mean[2]) / geometry;
+    if (!(intensity.allFinite() && intensity.minCoeff() > 0))
+        throw InputError(fmt::format("the grey card is dark in {}", light.file), remedy);
+    return intensity;
+}
+
+}  // namespace
+
+const char* name(IntensityOrigin origin) {
+    for (const auto& [value, text] : names)
+        if (value == origin) return text;
+    return "";
+}
+
+std::optional<IntensityOrigin> intensity_origin_from_name(const std::string& name) {
+    for (const auto& [value, text] : names)
+        if (name == text) return value;
+    return std::nullopt;
+}
+
+void GreyCard::validate() const {
+    if (area.width < 1 || area.height < 1)
+        throw InputError(fmt::format("area is {}x{} pixels", area.width, area.height), "allowed: 1x1 or more");
+    if (!(std::abs(normal.norm() - 1) < 1e-6))
+        throw InputError(fmt::format("normal has the length {}", normal.norm()), "allowed: a unit vector");
+}
+
+Lights with_intensities_of_card(const std::vector<cv::Mat3f>& frames, const std::vector<cv::Mat1b>& clipped,
+                                Lights lights, const GreyCard& card) {
+    card.validate();
+    if (frames.size() != lights.size() || clipped.size() != lights.size())
+        throw InputError(fmt::format("{} frames of the grey card for {} lights", frames.size(), lights.size()),
+                         "give one frame for each light");
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+        if (!lights[i].used) continue;
+        require_in_picture(card, frames[i].size());
+        lights[i].intensity = intensity_of(frames[i], clipped[i], lights[i], card);
+    }
+    return with_mean_intensity_one(std::move(lights));
+}
+
+Lights with_mean_intensity_one(Lights lights) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    double count = 0;
+    for (const Light& light : lights)
+        if (light.used) {
+            sum += light.intensity;
+            count += 1;
+        }
+    if (!(count > 0 && sum.minCoeff() > 0)) return lights;
+    for (Light& light : lights) light.intensity = count * light.intensity.cwiseQuotient(sum);
+    return lights;
+}
+
+double intensity_spread(const Lights& lights) {
+    Eigen::Vector3d least = Eigen::Vector3d::Constant(HUGE_VAL), most = Eigen::Vector3d::Zero();
+    for (const Light& light : lights)
+        if (light.used) {
+            least = least.cwiseMin(light.intensity);
+            most = most.cwiseMax(light.intensity);
+        }
+    return most.maxCoeff() > 0 ? most.cwiseQuotient(least).maxCoeff() : 1;
+}
+
+std::optional<std::string> spread_in_words(const Lights& lights) {
+    const double spread = intensity_spread(lights);
+    if (!(spread > noticeable_spread)) return std::nullopt;
+    return fmt::format("the lamps differ in brightness by {:.2g} times", spread);
+}
+
+}  // namespace darkbox
