@@ -237,9 +237,9 @@ const Spot* own_spot(const std::vector<FrameSpots>& frames, std::size_t own) {
 /// Spots apart from the lamp's that are like it: not its own flare, not specks.
 int spots_like(const Spots& faint, const Spots& bright, const Spot& lamp) {
     const int lamp_label = faint.labels(cv::Point(lamp.middle));
-    return static_cast<int>(std::count_if(faint.spots.begin(), faint.spots.end(), [&](const Spot& s) {
-               return s.label != lamp_label && s.area >= lamp.area / 3;
-           })) +
+    return static_cast<int>(
+               std::count_if(faint.spots.begin(), faint.spots.end(),
+                             [&](const Spot& s) { return s.label != lamp_label && s.area >= lamp.area / 3; })) +
            bright.others;
 }
 
@@ -270,8 +270,7 @@ std::vector<HighlightReading> find_highlights(const std::vector<cv::Mat3f>& fram
     }
     const double usual = median(peaks);
     std::vector<HighlightReading> readings;
-    for (std::size_t i = 0; i < frames.size(); ++i)
-        readings.push_back(read_frame(images, spots, i, usual, zone, ball));
+    for (std::size_t i = 0; i < frames.size(); ++i) readings.push_back(read_frame(images, spots, i, usual, zone, ball));
     return readings;
 }
 

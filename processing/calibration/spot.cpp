@@ -12,11 +12,13 @@ namespace {
 constexpr double floor_share = 0.1;   ///< of a spot's height: radiance that counts
 constexpr double upper_share = 0.45;  ///< its upper part, for comparison
 constexpr double least_sigma_px = 0.005;
-constexpr double blind_px = 0.29;      ///< standard deviation of a place known to one pixel
-constexpr double blur_px2 = 0.4;       ///< second moment that pixels and optics add to a spot
-constexpr double bloom_px = 0.7;       ///< by which a saturated spot outgrows the lamp's image
-constexpr double border_sigma = 0.12;  ///< px; of a saturated spot of radius 1, less for larger ones: simulated
-constexpr double part_sigma = 0.2;     ///< of the upper and lower parts' disagreement: simulated
+constexpr double blind_px = 0.29;         ///< standard deviation of a place known to one pixel
+constexpr double blur_px2 = 0.4;          ///< second moment that pixels and optics add to a spot
+constexpr double bloom_px = 0.7;          ///< by which a saturated spot outgrows the lamp's image
+constexpr double border_sigma = 0.12;     ///< px; of a saturated spot of radius 1, less for larger ones: simulated
+constexpr double part_sigma = 0.2;        ///< of the upper and lower parts' disagreement: simulated
+constexpr double round_residual = 0.12;   ///< squares per pixel of border, below which a saturated spot is a round lamp
+constexpr double odd_shape_sigma = 0.02;  ///< of the radius: a saturated spot of another shape hides its lamp's middle
 
 struct Centroid {
     cv::Point2d at;
@@ -117,10 +119,13 @@ SpotMeasure by_border(const SpotPatch& patch) {
         at = fit.p;
         if (!best || fit.residual < best->residual) best = fit;
     }
-    SpotMeasure measure;
-    measure.at = {best->p[0], best->p[1]};
-    measure.radius_px = std::max(0.0, best->p[2] - bloom_px);
-    measure.sigma_px = border_sigma / best->p[2];
+    const double radius = best->p[2];
+    const cv::Point2d middle(best->p[0], best->p[1]);
+    SpotMeasure measure{middle, border_sigma / radius, std::max(0.0, radius - bloom_px)};
+    if (best->residual > round_residual * 2 * std::numbers::pi * radius) {
+        measure.at = start.at;
+        measure.sigma_px = std::hypot(measure.sigma_px, cv::norm(middle - start.at) / 2, odd_shape_sigma * radius);
+    }
     return measure;
 }
 

@@ -26,10 +26,10 @@ struct SpotMeasure {
     double radius_px = 0;  ///< of the circle of the same area
 };
 
-/// Where a spot is. One below full scale: its centroid weighted by radiance above a tenth of its height. A saturated one
-/// holds its place in its border alone, so an ellipse of the expected shape is fitted to that border.
-/// The standard deviation holds noise, what pixels hide of a small spot's place, and how far the spot's upper and lower
-/// parts disagree about it.
+/// Where a spot is. One below full scale: its centroid weighted by radiance above a tenth of its height. A saturated
+/// one holds its place in its border alone, so an ellipse of the expected shape is fitted to that border; where flare
+/// has given it another shape, the centroid is the better guess, and less certain. The standard deviation holds noise,
+/// what pixels hide of a small spot's place, and how far the spot's upper and lower parts disagree about it.
 SpotMeasure measure_spot(const SpotPatch& patch);
 
 }  // namespace darkbox
