@@ -15,8 +15,8 @@ constexpr double least_sigma_px = 0.005;
 constexpr double blind_px = 0.29;         ///< standard deviation of a place known to one pixel
 constexpr double blur_px2 = 0.4;          ///< second moment that pixels and optics add to a spot
 constexpr double bloom_px = 0.7;          ///< by which a saturated spot outgrows the lamp's image
-constexpr double border_sigma = 0.12;     ///< px; of a saturated spot of radius 1, less for larger ones: simulated
-constexpr double part_sigma = 0.2;        ///< of the upper and lower parts' disagreement: simulated
+constexpr double border_sigma = 0.15;     ///< px; of a saturated spot of radius 1, less for larger ones: simulated
+constexpr double part_sigma = 0.25;       ///< of the upper and lower parts' disagreement: simulated
 constexpr double round_residual = 0.12;   ///< squares per pixel of border, below which a saturated spot is a round lamp
 constexpr double odd_shape_sigma = 0.02;  ///< of the radius: a saturated spot of another shape hides its lamp's middle
 
@@ -42,10 +42,12 @@ Centroid centroid_above(const SpotPatch& patch, double share) {
     return c;
 }
 
-/// What noise of one unit in every pixel does to the centroid.
+/// What noise of one unit in every pixel that counts does to the centroid.
 double noise_gain(const SpotPatch& patch, const Centroid& c) {
+    const double floor = patch.background + floor_share * (patch.top - patch.background);
     double squares = 0;
-    for (const cv::Point2d& p : patch.at) squares += (p - c.at).dot(p - c.at) / 2;
+    for (std::size_t i = 0; i < patch.at.size(); ++i)
+        if (patch.value[i] > floor) squares += (patch.at[i] - c.at).dot(patch.at[i] - c.at) / 2;
     return std::sqrt(squares) / c.sum;
 }
 
