@@ -42,12 +42,12 @@ Centroid centroid_above(const SpotPatch& patch, double share) {
     return c;
 }
 
-/// What noise of one unit in every pixel that counts does to the centroid.
+/// What noise of one unit does to the centroid in every pixel that counts, or that noise can make count.
 double noise_gain(const SpotPatch& patch, const Centroid& c) {
     const double floor = patch.background + floor_share * (patch.top - patch.background);
     double squares = 0;
     for (std::size_t i = 0; i < patch.at.size(); ++i)
-        if (patch.value[i] > floor) squares += (patch.at[i] - c.at).dot(patch.at[i] - c.at) / 2;
+        if (patch.value[i] > floor - 2 * patch.noise) squares += (patch.at[i] - c.at).dot(patch.at[i] - c.at) / 2;
     return std::sqrt(squares) / c.sum;
 }
 
