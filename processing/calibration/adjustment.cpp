@@ -18,16 +18,6 @@ ceres::LossFunction* loss_function(Loss loss) {
     return loss == Loss::robust ? new ceres::CauchyLoss(cauchy_scale) : nullptr;
 }
 
-/// Points about the lamp that stand for its disc as the highlight's area shows it: on a ball of radius r an image of
-/// area A holds the solid angle 4 A / r^2, for a mirror ball maps solid angles evenly.
-std::array<Eigen::Vector3d, 4> rim_of(const Eigen::Vector3d& lamp, const Highlight& highlight, double radius_px) {
-    const double angular_radius = 2 * std::sqrt(highlight.area_px / std::numbers::pi) / radius_px;
-    const double reach = angular_radius / std::numbers::sqrt2 * lamp.norm();
-    const Eigen::Vector3d a = lamp.unitOrthogonal() * reach;
-    const Eigen::Vector3d b = lamp.normalized().cross(a);
-    return {a, b, -a, -b};
-}
-
 }  // namespace
 
 Adjustment::Adjustment(const RefineInput& input, const std::vector<Believed>& believed, Loss loss) : input_(input) {
@@ -90,12 +80,10 @@ void Adjustment::add_lamps(const std::vector<Believed>& believed) {
 void Adjustment::add_highlights(std::size_t i, const Believed& believed, Loss loss) {
     using Mirrored = ceres::AutoDiffCostFunction<HighlightResidual, 2, 4, 3>;
     const BallObservations& ball = input_.balls[i];
-    const double radius_px = ball.sphere.radius_mm / input_.view.mm_per_pixel;
     for (std::size_t frame = 0; frame < ball.highlights.size(); ++frame) {
         if (!believed.highlight[frame]) continue;
         const Highlight& h = *ball.highlights[frame];
         HighlightResidual residual{Viewing(input_.view), h.u, h.v, h.sigma_px, input_.lamps == LampModel::near};
-        residual.rim = rim_of(input_.start[frame], h, radius_px);
         const auto id = problem_.AddResidualBlock(new Mirrored(new HighlightResidual(residual)), loss_function(loss),
                                                   spheres_[i].data(), lamps_[frame].data());
         shown_.push_back({i, frame, id});

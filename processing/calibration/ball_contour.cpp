@@ -7,17 +7,23 @@
 #include <optional>
 
 #include "acquisition/frame/error.h"
+#include "processing/calibration/edge_profile.h"
 
 namespace darkbox {
 namespace {
 
 constexpr double step_px = 0.5;
-constexpr double blur_px = 0.8;
-constexpr double floor_radiance = 1.0 / 255;
+constexpr double blur_px = 0.8;           ///< applied to the picture before it is read
+constexpr double read_blur_px = 0.92;     ///< of the profiles: that, the pixels', and the interpolation's
+constexpr double margin_px = 2.5;         ///< of profile beyond the offsets that are tried
+constexpr double least_significance = 4;  ///< standard deviations of noise that an edge explains
+constexpr double floor_radiance = 1.0 / 1024;
 
 struct Reading {
     cv::Point2d at;
-    double strength = 0;  ///< change per pixel relative to the brightness there
+    double strength = 0;  ///< the edge's height relative to the brightness there
+    double height = 0;    ///< root mean square over the profile, as `noise`
+    double noise = 0;
 };
 
 std::optional<double> sample(const cv::Mat1f& image, double x, double y) {
@@ -29,11 +35,10 @@ std::optional<double> sample(const cv::Mat1f& image, double x, double y) {
     return (1 - fy) * above + fy * below;
 }
 
-/// Brightness along a radius, `reach` px to both sides of the circle; empty where it leaves the picture.
-std::vector<double> profile(const cv::Mat1f& image, const Circle& circle, cv::Point2d out, double reach) {
+/// Brightness along a radius, `half` steps to both sides of the circle; empty where it leaves the picture.
+std::vector<double> profile(const cv::Mat1f& image, const Circle& circle, cv::Point2d out, int half) {
     std::vector<double> values;
-    const int steps = static_cast<int>(std::ceil(reach / step_px)) + 1;
-    for (int i = -steps; i <= steps; ++i) {
+    for (int i = -half; i <= half; ++i) {
         const double radius = circle.radius + i * step_px;
         const auto value = sample(image, circle.x + radius * out.x, circle.y + radius * out.y);
         if (!value) return {};
@@ -42,43 +47,51 @@ std::vector<double> profile(const cv::Mat1f& image, const Circle& circle, cv::Po
     return values;
 }
 
-std::optional<Reading> steepest(const cv::Mat1f& image, const Circle& circle, double angle, double reach) {
-    const cv::Point2d out(std::cos(angle), std::sin(angle));
-    const std::vector<double> p = profile(image, circle, out, reach);
-    if (p.empty()) return std::nullopt;
-    std::vector<double> slope(p.size(), 0.0);
-    for (std::size_t i = 1; i + 1 < p.size(); ++i) slope[i] = std::abs(p[i + 1] - p[i - 1]) / (2 * step_px);
-    const auto peak = std::max_element(slope.begin() + 2, slope.end() - 2);
-    const auto i = static_cast<std::size_t>(peak - slope.begin());
-    const double before = slope[i - 1], at = slope[i], after = slope[i + 1];
-    if (!(at > before && at >= after)) return std::nullopt;  // steepest at the end of the reach: not this edge
-    const double shift = 0.5 * (before - after) / (before - 2 * at + after);
-    const std::size_t middle = p.size() / 2;
-    const double offset = (static_cast<double>(i) + shift - static_cast<double>(middle)) * step_px;
-    const double radius = circle.radius + offset;
-    return Reading{{circle.x + radius * out.x, circle.y + radius * out.y}, at / (std::max(p[i], 0.0) + floor_radiance)};
-}
-
 std::size_t directions(const Circle& circle) {
     return static_cast<std::size_t>(std::clamp(2 * std::numbers::pi * circle.radius, 48.0, 1440.0));
 }
 
-/// Readings all around, without those far weaker than the strong ones: dark on dark has no outline to read.
-std::vector<cv::Point2d> read_outline(const cv::Mat1f& image, const Circle& circle, double reach) {
+double median(std::vector<double> values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+std::vector<Reading> read_edges(const cv::Mat1f& image, const Circle& circle, double reach) {
+    const int half = static_cast<int>(std::ceil((reach + margin_px) / step_px));
+    const ProfileModel model(half, step_px, read_blur_px, reach);
     std::vector<Reading> readings;
     const std::size_t n = directions(circle);
-    for (std::size_t i = 0; i < n; ++i)
-        if (const auto r =
-                steepest(image, circle, 2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(n), reach))
-            readings.push_back(*r);
+    for (std::size_t i = 0; i < n; ++i) {
+        const double angle = 2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(n);
+        const cv::Point2d out(std::cos(angle), std::sin(angle)), centre(circle.x, circle.y);
+        const std::vector<double> p = profile(image, circle, out, half);
+        if (p.empty()) continue;
+        const auto edge = model.fit(p);
+        if (!edge) continue;
+        const double level = std::max(0.0, p[p.size() / 2]) + floor_radiance;
+        readings.push_back({centre + (circle.radius + edge->offset) * out, edge->height / level, edge->height,
+                            std::sqrt(std::max(0.0, edge->residual) / static_cast<double>(p.size()))});
+    }
+    return readings;
+}
+
+/// Readings all around, without those that noise explains and those far weaker than the strong ones: dark on dark has
+/// no outline to read.
+std::vector<cv::Point2d> read_outline(const cv::Mat1f& image, const Circle& circle, double reach) {
+    const std::vector<Reading> readings = read_edges(image, circle, reach);
     if (readings.empty()) return {};
-    std::vector<double> strengths;
-    for (const Reading& r : readings) strengths.push_back(r.strength);
+    std::vector<double> strengths, noises;
+    for (const Reading& r : readings) {
+        strengths.push_back(r.strength);
+        noises.push_back(r.noise);
+    }
+    const double noise = median(noises);
     const auto strong = strengths.begin() + static_cast<std::ptrdiff_t>(strengths.size() * 8 / 10);
     std::nth_element(strengths.begin(), strong, strengths.end());
     std::vector<cv::Point2d> points;
     for (const Reading& r : readings)
-        if (r.strength > 0 && r.strength >= 0.2 * *strong) points.push_back(r.at);
+        if (r.height > least_significance * noise && r.strength >= 0.2 * *strong) points.push_back(r.at);
     return points;
 }
 

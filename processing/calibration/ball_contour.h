@@ -16,8 +16,8 @@ struct BallContour {
     std::size_t rejected = 0;         ///< readings off the circle
 };
 
-/// The outline near `start`: along each radius, the steepest change of brightness, to a fraction of a pixel. The search
-/// narrows while the circle settles. `radiance` is linear: an anti-aliased edge has its steepest point where it is.
+/// The outline near `start`: along each radius, where the ball begins (see ProfileModel), to a fraction of a pixel. The
+/// search narrows while the circle settles. `radiance` is linear.
 BallContour measure_contour(const cv::Mat1f& radiance, const Circle& start);
 
 /// The outline of a mask (255 on the ball, edges may be anti-aliased); the picture's border is not outline.

@@ -8,10 +8,12 @@
 
 namespace darkbox {
 
-/// The mirror ball in frames lit by one lamp each, to about a pixel; no value where nothing looks like one.
+/// The mirror balls in frames lit by one lamp each, to about a pixel, the surest first; none overlaps another.
 /// Edge pixels of the mean frame vote for the centres they point to, radius by radius (Kimme et al. 1975, a Hough
-/// transform with gradient directions); the best circles are fitted to their edges, and each is judged by the share of
-/// its outline that has edges times the share of frames with a lamp's glint in it.
-std::optional<Ball> find_ball(const std::vector<cv::Mat3f>& frames);
+/// transform with gradient directions). Only places where most frames show a glint can be a ball's, and the best
+/// circles there are fitted to their edges. A ball's confidence is the share of its outline in view that edges support
+/// times the share of frames with a lamp's glint in it. Balls stand in the light of the same lamps: a circle whose
+/// glints do not lie as the surest ball's do is not one.
+std::vector<Ball> find_balls(const std::vector<cv::Mat3f>& frames);
 
 }  // namespace darkbox

@@ -39,7 +39,6 @@ struct Highlight {
     double v = 0;
     double sigma_px = 0.5;  ///< standard deviation of the centroid per axis
     bool clipped = false;   ///< the plateau reached full scale
-    double area_px = 0;     ///< of the lamp's image; 0: not known, taken as a point
 };
 
 enum class CalibrationMethod {

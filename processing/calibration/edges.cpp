@@ -8,14 +8,15 @@ namespace darkbox {
 namespace {
 
 constexpr double blur_px = 1.2;
-constexpr double kept_share = 0.15;
+constexpr double quiet_share = 0.25;     ///< of the picture that shows noise alone
+constexpr float edge_in_quiet = 6;       ///< gradients of an edge over that share's: 4.5 standard deviations
 constexpr float least_gradient = 0.01F;  ///< per pixel, of the compressed picture; below it there is only rounding
 
 float threshold_for(const cv::Mat1f& magnitude) {
     std::vector<float> all(magnitude.begin(), magnitude.end());
-    const auto at = all.begin() + static_cast<std::ptrdiff_t>(static_cast<double>(all.size()) * (1 - kept_share));
+    const auto at = all.begin() + static_cast<std::ptrdiff_t>(static_cast<double>(all.size()) * quiet_share);
     std::nth_element(all.begin(), at, all.end());
-    return std::max(*at, least_gradient);
+    return std::max(edge_in_quiet * *at, least_gradient);
 }
 
 }  // namespace

@@ -11,7 +11,7 @@ struct Edge {
     cv::Point2d across;
 };
 
-/// Ridges of the gradient's magnitude among the strongest 15 % of the picture, one pixel wide.
+/// Ridges of the gradient's magnitude that stand out of the noise of the picture's quietest quarter, one pixel wide.
 std::vector<Edge> find_edges(const cv::Mat1f& image);
 
 }  // namespace darkbox

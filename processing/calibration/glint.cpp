@@ -11,7 +11,7 @@ constexpr double max_share_of_zone = 0.04;
 constexpr double max_small_area_px = 12;  ///< a spot of this size is compact in a ball of any size
 constexpr double least_contrast = 3;
 constexpr double least_radiance = 0.02;
-constexpr double least_movement = 0.02;  ///< of the radius
+constexpr double least_movement = 0.02;  ///< in radii
 
 struct Spot {
     double value = 0;
@@ -45,17 +45,53 @@ std::optional<Spot> find_glint(const cv::Mat1f& image, const Circle& circle) {
     return spot;
 }
 
+/// Median over the images, pixel by pixel.
+cv::Mat1f usual_light(const std::vector<cv::Mat1f>& images) {
+    cv::Mat1f usual(images.front().size());
+    std::vector<float> values(images.size());
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    for (int y = 0; y < usual.rows; ++y)
+        for (int x = 0; x < usual.cols; ++x) {
+            for (std::size_t i = 0; i < images.size(); ++i) values[i] = images[i](y, x);
+            std::nth_element(values.begin(), middle, values.end());
+            usual(y, x) = *middle;
+        }
+    return usual;
+}
+
 }  // namespace
 
-double glint_share(const std::vector<cv::Mat1f>& images, const Circle& circle) {
-    std::vector<cv::Point2d> spots;
-    for (const cv::Mat1f& image : images)
-        if (const auto spot = find_glint(image, circle)) spots.emplace_back(spot->at);
-    if (spots.empty()) return 0;
+std::vector<std::optional<cv::Point2d>> find_glints(const std::vector<cv::Mat1f>& images, const Circle& circle) {
+    std::vector<std::optional<cv::Point2d>> glints;
+    for (const cv::Mat1f& image : images) {
+        glints.emplace_back();
+        if (const auto spot = find_glint(image, circle))
+            glints.back() = (cv::Point2d(spot->at) - cv::Point2d(circle.x, circle.y)) / circle.radius;
+    }
+    return glints;
+}
+
+double glint_share(const std::vector<std::optional<cv::Point2d>>& glints) {
+    const std::optional<cv::Point2d>* first = nullptr;
     double movement = 0;
-    for (const auto& spot : spots) movement = std::max(movement, cv::norm(spot - spots.front()));
-    if (images.size() > 1 && movement < least_movement * circle.radius) return 0;
-    return static_cast<double>(spots.size()) / static_cast<double>(images.size());
+    int count = 0;
+    for (const auto& glint : glints) {
+        if (!glint) continue;
+        ++count;
+        if (!first) first = &glint;
+        movement = std::max(movement, cv::norm(*glint - **first));
+    }
+    if (glints.size() > 1 && movement < least_movement) return 0;
+    return static_cast<double>(count) / static_cast<double>(glints.size());
+}
+
+std::vector<cv::Mat1b> flashes(const std::vector<cv::Mat1f>& images) {
+    const cv::Mat1f limit(least_contrast *
+                              (images.size() < 3 ? cv::Mat1f(images.front().size(), 0.0F) : usual_light(images)) +
+                          least_radiance);
+    std::vector<cv::Mat1b> masks;
+    for (const cv::Mat1f& image : images) masks.emplace_back(image > limit);
+    return masks;
 }
 
 }  // namespace darkbox

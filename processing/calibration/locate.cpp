@@ -90,11 +90,6 @@ LocatedBall locate_near(const Ball& given, const std::vector<cv::Mat3f>& frames,
     return located;
 }
 
-std::vector<Ball> search(const std::vector<cv::Mat3f>& frames) {
-    const auto ball = find_ball(frames);
-    return ball ? std::vector<Ball>{*ball} : std::vector<Ball>{};
-}
-
 LocatedBall locate_found(const Ball& found, const cv::Mat1f& mean) {
     const BallContour contour = measure_contour(mean, circle_of(found));
     LocatedBall located = located_by(contour);
@@ -116,7 +111,7 @@ std::vector<LocatedBall> locate_balls(const std::vector<cv::Mat3f>& frames, cons
     for (const Ball& given : options.balls) located.push_back(locate_near(given, frames, mean, options.method));
     require_apart(options.balls);
     if (!located.empty()) return located;
-    for (const Ball& found : search(frames)) located.push_back(locate_found(found, mean));
+    for (const Ball& found : find_balls(frames)) located.push_back(locate_found(found, mean));
     if (located.empty())
         throw InputError("no mirror ball was found in the frames",
                          "say where it is with --ball X,Y,R (pixels), or give --ball-mask");

@@ -1,6 +1,7 @@
 #include "processing/calibration/outline.h"
 
 #include <algorithm>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "processing/maps/maps.h"
@@ -8,7 +9,19 @@
 namespace darkbox {
 namespace {
 
-constexpr double floor_radiance = 1.0 / 255;
+constexpr double least_floor = 1.0 / 1024;
+constexpr double floor_in_noise = 4;
+
+/// Standard deviation of a pixel's noise, from the differences of neighbours, most of which see no edge.
+double noise_of(const cv::Mat1f& image) {
+    std::vector<float> differences;
+    for (int y = 0; y < image.rows; ++y)
+        for (int x = 1; x < image.cols; ++x) differences.push_back(std::abs(image(y, x) - image(y, x - 1)));
+    if (differences.empty()) return 0;
+    const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
+    std::nth_element(differences.begin(), middle, differences.end());
+    return 1.4826 * *middle / std::sqrt(2.0);
+}
 
 }  // namespace
 
@@ -37,7 +50,7 @@ ReducedFrames reduce(const std::vector<cv::Mat3f>& frames, int max_side) {
 cv::Mat1f compress(const cv::Mat1f& radiance) {
     cv::Mat1f compressed;
     cv::max(radiance, 0.0F, compressed);
-    compressed += floor_radiance;
+    compressed += std::max(least_floor, floor_in_noise * noise_of(radiance));
     cv::log(compressed, compressed);
     return compressed;
 }

@@ -18,7 +18,8 @@ struct ReducedFrames {
 };
 ReducedFrames reduce(const std::vector<cv::Mat3f>& frames, int max_side);
 
-/// Logarithm above a floor of about one 8-bit step: a dark ball before a dark wall shows as clearly as a bright one.
+/// Logarithm above a floor of a few standard deviations of the noise: a dark ball before a dark wall shows as clearly
+/// as a bright one.
 cv::Mat1f compress(const cv::Mat1f& radiance);
 
 }  // namespace darkbox

@@ -35,29 +35,24 @@ struct ContourResidual {
     }
 };
 
-/// A highlight's place against where the sphere mirrors the lamp. The highlight is the centroid of a disc; the mean of
-/// any smooth function over a disc is, to third order, its mean over four points at 1/sqrt(2) of the radius.
+/// A highlight's place, corrected for the lamp's size, against where the sphere mirrors the lamp's middle.
 struct HighlightResidual {
     Viewing viewing;
     double u, v, sigma_px;
     bool near = false;
-    std::array<Eigen::Vector3d, 4> rim{};  ///< the four points, relative to the lamp; all zero for a point
 
     template <class T>
     bool operator()(const T* sphere, const T* lamp, T* residual) const {
         const Vector3<T> centre{sphere[0], sphere[1], sphere[2]};
-        Vector2<T> sum{T(0), T(0)};
-        for (const Eigen::Vector3d& off : rim) {
-            const Vector3<T> source{lamp[0] + off[0], lamp[1] + off[1], lamp[2] + off[2]};
-            const Vector3<T> distant = unit_of(source);
-            const auto to_lamp = [&](const Vector3<T>& point) {
-                return near ? unit_of<T>(Vector3<T>(source - point)) : distant;
-            };
-            const Vector3<T> normal = mirror_normal(viewing, centre, sphere[3], to_lamp);
-            sum += viewing.project<T>(Vector3<T>(centre + sphere[3] * normal));
-        }
-        residual[0] = (0.25 * sum[0] - u) / sigma_px;
-        residual[1] = (0.25 * sum[1] - v) / sigma_px;
+        const Vector3<T> source{lamp[0], lamp[1], lamp[2]};
+        const Vector3<T> distant = unit_of(source);
+        const auto to_lamp = [&](const Vector3<T>& point) {
+            return near ? unit_of<T>(Vector3<T>(source - point)) : distant;
+        };
+        const Vector3<T> normal = mirror_normal(viewing, centre, sphere[3], to_lamp);
+        const Vector2<T> seen = viewing.project<T>(Vector3<T>(centre + sphere[3] * normal));
+        residual[0] = (seen[0] - u) / sigma_px;
+        residual[1] = (seen[1] - v) / sigma_px;
         return true;
     }
 };

@@ -46,11 +46,8 @@ ViewGeometry view_in(const json& j) {
 
 ordered_json highlight_json(const std::optional<Highlight>& highlight) {
     if (!highlight) return nullptr;
-    return {{"u", highlight->u},
-            {"v", highlight->v},
-            {"sigma_px", highlight->sigma_px},
-            {"clipped", highlight->clipped},
-            {"area_px", highlight->area_px}};
+    return {
+        {"u", highlight->u}, {"v", highlight->v}, {"sigma_px", highlight->sigma_px}, {"clipped", highlight->clipped}};
 }
 
 ordered_json light_json(const Light& light, const std::string& lamp, const std::optional<Highlight>& highlight) {
@@ -84,7 +81,7 @@ Light light_in(const json& j) {
 std::optional<Highlight> highlight_in(const json& h) {
     if (h.is_null()) return std::nullopt;
     return Highlight{h.at("u").get<double>(), h.at("v").get<double>(), h.at("sigma_px").get<double>(),
-                     h.at("clipped").get<bool>(), h.value("area_px", 0.0)};
+                     h.at("clipped").get<bool>()};
 }
 
 /// A perspective camera's ball also has the half axes of its outline.

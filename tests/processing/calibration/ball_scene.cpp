@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 namespace darkbox::test {
 namespace {
-
-constexpr int grid = 4;  ///< sub-pixels per side
 
 double room(const Eigen::Vector3d& direction) { return 0.03 + 0.02 * direction.y() + 0.01 * direction.x(); }
 
@@ -15,23 +14,31 @@ double mirrored(const BallScene& scene, double x, double y, const Eigen::Vector3
     const double z = std::sqrt(1 - x * x - y * y);
     const Eigen::Vector3d seen(2 * z * x, 2 * z * y, 2 * z * z - 1);
     const bool lamp = seen.dot(light) > std::cos(scene.lamp_radius_deg * std::numbers::pi / 180);
-    return lamp ? scene.lamp_radiance : 0.5 * room(seen);
+    return lamp ? scene.lamp_radiance : 0.5 * scene.room * room(seen);
 }
 
-double diffuse(double x, double y, const Eigen::Vector3d& light) {
+double diffuse(const BallScene& scene, double x, double y, const Eigen::Vector3d& light) {
     const Eigen::Vector3d normal(x, y, std::sqrt(1 - x * x - y * y));
-    return 0.7 * std::max(0.0, normal.dot(light));
+    const auto check = [&](double t) { return static_cast<int>(std::floor(scene.checks * (t + 1) / 2)); };
+    const double albedo = (check(x) + check(y)) % 2 == 0 ? 0.7 : 0.2;
+    return albedo * std::max(0.0, normal.dot(light));
 }
 
 /// Radiance where a view ray at (u, v) ends.
 double radiance(const BallScene& scene, double u, double v, const Eigen::Vector3d& light) {
-    const double bx = (u - scene.ball.x) / scene.ball.radius, by = -(v - scene.ball.y) / scene.ball.radius;
-    if (bx * bx + by * by < 1) return mirrored(scene, bx, by, light);
+    const auto seen_on = [&](const Ball& ball) -> std::optional<double> {
+        const double x = (u - ball.x) / ball.radius, y = -(v - ball.y) / ball.radius;
+        if (x * x + y * y < 1) return mirrored(scene, x, y, light);
+        return std::nullopt;
+    };
+    if (const auto seen = seen_on(scene.ball)) return *seen;
+    for (const Ball& ball : scene.more_balls)
+        if (const auto seen = seen_on(ball)) return *seen;
     const double object_radius = 0.3 * scene.size.height;
     const double ox = (u - 0.25 * scene.size.width) / object_radius;
     const double oy = -(v - 0.5 * scene.size.height) / object_radius;
-    if (ox * ox + oy * oy < 1) return diffuse(ox, oy, light);
-    return 0.06 * light.z();
+    if (ox * ox + oy * oy < 1) return diffuse(scene, ox, oy, light);
+    return scene.wall * light.z();
 }
 
 }  // namespace
@@ -67,6 +74,7 @@ std::vector<std::string> frame_names(std::size_t n) {
 
 cv::Mat3f photograph(const BallScene& scene, const Eigen::Vector3d& light) {
     cv::Mat3f image(scene.size);
+    const int grid = scene.rays_per_pixel_side;
     NormalNumbers noise(scene.seed ^ static_cast<std::uint64_t>(1e6 * (light.x() + 2 * light.y() + 4)));
     for (int v = 0; v < image.rows; ++v)
         for (int u = 0; u < image.cols; ++u) {

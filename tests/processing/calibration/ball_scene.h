@@ -10,11 +10,16 @@
 
 namespace darkbox::test {
 
-/// A mirror ball beside a diffuse sphere before a dim wall, seen orthographically. Written without the code under test:
+/// Mirror balls beside a diffuse sphere before a dim wall, seen orthographically. Written without the code under test:
 /// each sub-pixel's view ray is mirrored and looked up in an environment of a dim room and one round lamp.
 struct BallScene {
     cv::Size size{360, 240};
     Ball ball{250.3, 130.6, 60.2, 1.0};
+    std::vector<Ball> more_balls;
+    double wall = 0.06;  ///< radiance lit from the front
+    double room = 1.0;   ///< brightness of what the balls mirror beside the lamp
+    int checks = 0;      ///< of the sphere's texture, across it; 0: plain
+    int rays_per_pixel_side = 4;
     double lamp_radius_deg = 2.0;
     double lamp_radiance = 0.9;
     double noise = 0.0;  ///< standard deviation, full scale = 1

@@ -53,8 +53,9 @@ TEST_F(Files, CalibrationComesBack) {
     calibration.balls = {{100.5, 90.25, 40.125, 0.9}};
     calibration.condition_number = std::numeric_limits<double>::infinity();
     calibration.method = "refined";
+    calibration.intensity_origin = IntensityOrigin::grey_card;
     calibration.warnings = {"b.png has no highlight"};
-    write_calibration(at("lights.json"), calibration, {"lamp-1", "lamp-2"});
+    write_calibration(at("lights.json"), calibration, {"dome", {"lamp-1", "lamp-2"}});
     const StoredCalibration stored = read_calibration(at("lights.json"));
     const Calibration& read = stored.calibration;
     ASSERT_EQ(read.lights.size(), 2u);
@@ -71,7 +72,9 @@ TEST_F(Files, CalibrationComesBack) {
     EXPECT_EQ(read.balls[0].radius, 40.125);
     EXPECT_TRUE(std::isinf(read.condition_number));
     EXPECT_EQ(read.warnings, calibration.warnings);
-    EXPECT_EQ(stored.lamps[1], "lamp-2");
+    EXPECT_EQ(read.intensity_origin, IntensityOrigin::grey_card);
+    EXPECT_EQ(stored.rig.name, "dome");
+    EXPECT_EQ(stored.rig.lamps[1], "lamp-2");
 }
 
 TEST_F(Files, AFileThatIsNoCalibrationIsNamed) {
