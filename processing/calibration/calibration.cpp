@@ -280,6 +280,19 @@ void refine_lights(const RaysToLamps& rays, RefineInput input, const std::vector
     warn_of_sizes(spheres, options, calibration);
 }
 
+/// A circle that the search found but no outline confirms may be what the ball mirrors.
+void warn_of_lost_outlines(const std::vector<LocatedBall>& balls, const CalibrationOptions& options,
+                           Calibration& calibration) {
+    if (!options.balls.empty()) return;
+    for (const LocatedBall& located : balls)
+        if (located.contour.empty())
+            calibration.warnings.push_back(fmt::format(
+                "the outline of the ball at ({:.1f}, {:.1f}) of radius {:.1f} could not be measured, so that all "
+                "lights "
+                "may be off by tens of degrees: look at calibration/ball.png and give the circle with --ball X,Y,R",
+                located.ball.x, located.ball.y, located.ball.radius));
+}
+
 Lights unread_lights(const std::vector<std::string>& files) {
     Lights lights(files.size());
     for (std::size_t i = 0; i < files.size(); ++i) {
@@ -301,6 +314,7 @@ Calibration calibrate(const std::vector<cv::Mat3f>& frames, const std::vector<st
     Calibration calibration;
     calibration.lights = unread_lights(files);
     std::vector<LocatedBall> balls = locate_balls(frames, options);
+    warn_of_lost_outlines(balls, options, calibration);
     auto readings = read_balls(frames, files, balls, options);
     for (const std::string& file : options.drop)
         calibration.rejected.push_back(fmt::format("{}: left out as asked", file));

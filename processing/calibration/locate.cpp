@@ -14,10 +14,12 @@
 namespace darkbox {
 namespace {
 
-constexpr double given_ball_sigma_px = 0.5;  ///< a circle drawn by hand
-constexpr double least_support = 0.15;       ///< share of the outline below which contour points say nothing
-constexpr double most_contour_shift = 6;     ///< of given_ball_sigma_px: beyond this the edge is another's
-constexpr double least_part_of_mask = 0.1;   ///< of its largest region: a smaller one is a slip of the brush
+constexpr double given_ball_sigma_px = 0.5;   ///< a circle drawn by hand
+constexpr double least_support = 0.15;        ///< share of the outline below which contour points say nothing
+constexpr double most_contour_shift = 6;      ///< of given_ball_sigma_px: beyond this the edge is another's
+constexpr double most_shift_of_found = 0.05;  ///< of the radius: beyond it the contour has slid onto something mirrored
+constexpr double found_ball_sigma_px = 1;     ///< a circle from the search alone
+constexpr double least_part_of_mask = 0.1;    ///< of its largest region: a smaller one is a slip of the brush
 
 Circle circle_of(const Ball& ball) { return {ball.x, ball.y, ball.radius}; }
 
@@ -93,10 +95,12 @@ LocatedBall locate_near(const Ball& given, const std::vector<cv::Mat3f>& frames,
 LocatedBall locate_found(const Ball& found, const cv::Mat1f& mean) {
     const BallContour contour = measure_contour(mean, circle_of(found));
     LocatedBall located = located_by(contour);
-    if (contour.support < least_support) {
+    const double shift = std::hypot(contour.circle.x - found.x, contour.circle.y - found.y) +
+                         std::abs(contour.circle.radius - found.radius);
+    if (contour.support < least_support || shift > std::max(2.0, most_shift_of_found * found.radius)) {
         located.ball = found;
         located.contour.clear();
-        located.sigma_px = given_ball_sigma_px;
+        located.sigma_px = found_ball_sigma_px;
     }
     located.ball.confidence = found.confidence;
     return located;

@@ -176,6 +176,9 @@ TEST(CapturedSheep, OneBallIsFoundAndItsHighlightsAreRead) {
     EXPECT_LT(reached.mean_deg, 1.6);
     EXPECT_LT(apart_px({balls[0].x, balls[0].y, balls[0].radius}, circle), 6);
     EXPECT_NEAR(balls[0].radius, circle.radius, 1);
+    const Calibration calibration = calibrate(capture.frames, capture.files);
+    ASSERT_FALSE(calibration.warnings.empty());
+    EXPECT_NE(calibration.warnings.front().find("could not be measured"), std::string::npos);
 }
 
 }  // namespace
