@@ -4,6 +4,11 @@ find_package(PkgConfig REQUIRED)
 find_package(Eigen3 REQUIRED NO_MODULE)
 find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs flann)
 find_package(Ceres REQUIRED)
+if(CMAKE_CXX_FLAGS MATCHES "-fsanitize=address")
+  # Under this sanitizer Eigen takes malloc's memory otherwise than the Ceres library does that was built without it, and
+  # one would free what the other took. The sanitizer's malloc is aligned as well.
+  add_compile_definitions(EIGEN_MALLOC_ALREADY_ALIGNED=1)
+endif()
 find_package(TBB REQUIRED)
 find_package(TIFF REQUIRED)
 find_package(PNG REQUIRED)

@@ -149,6 +149,14 @@ std::optional<double> Adjustment::highlight_off_px(std::size_t ball, std::size_t
     return std::nullopt;
 }
 
+std::optional<double> Adjustment::off_place_mm(std::size_t frame, const Eigen::Vector3d& place_in_rig_mm) const {
+    if (!has_lamp_[frame]) return std::nullopt;
+    Eigen::Vector3d off;
+    const NominalResidual residual{place_in_rig_mm, 1.0, input_.lamps == LampModel::near};
+    residual(turn_.data(), shift_.data(), lamps_[frame].data(), off.data());
+    return off.norm();
+}
+
 std::vector<Eigen::Matrix3d> Adjustment::lamp_covariances() {
     ceres::Covariance::Options options;
     options.num_threads = 1;

@@ -36,6 +36,9 @@ public:
     std::vector<double> contour_distances_px(std::size_t ball) const;
     /// How far a highlight lies from where the ball mirrors its lamp, pixels.
     std::optional<double> highlight_off_px(std::size_t ball, std::size_t frame) const;
+    /// How far the lamp stands from a place in the rig, as the rig's estimated pose has it; of a distant lamp's
+    /// direction, at that place. No value for a frame without a believed highlight.
+    std::optional<double> off_place_mm(std::size_t frame, const Eigen::Vector3d& place_in_rig_mm) const;
     /// One per frame, of lamp(); zero where it cannot be had.
     std::vector<Eigen::Matrix3d> lamp_covariances();
 

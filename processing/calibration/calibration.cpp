@@ -256,6 +256,11 @@ void keep_refined(const RefineResult& refined, const RefineInput& input, const s
                             "left out, which may be the wrong one",
                             file, r.off_px, r.ball + 1));
     }
+    for (const MisplacedLamp& lamp : refined.misplaced)
+        calibration.warnings.push_back(
+            fmt::format("the lamp in {} does not stand where the rig's description has it, but about {:.0f} mm away; "
+                        "its place there was not used",
+                        calibration.lights[lamp.frame].file, lamp.off_mm));
     calibration.method = "refined";
 }
 

@@ -15,6 +15,7 @@ namespace {
 constexpr double rejected_sigmas = 4;
 constexpr double least_contour_reject_px = 0.1;
 constexpr double least_highlight_reject_px = 0.5;  ///< nearer than this no highlight is called wrong
+constexpr double misplaced_slacks = 5;             ///< of NominalLamps::slack_mm
 constexpr int most_rounds = 5;
 
 void require_on_balls(const RefineInput& input) {
@@ -63,6 +64,15 @@ void judge_contour(const BallObservations& ball, const std::vector<double>& dist
     result.readings_per_independent = noise.readings_per_independent;
 }
 
+/// By how many standard deviations a highlight lies off; no value where it fits.
+std::optional<double> misfit_sigmas(const RefineInput& input, const Adjustment& adjustment, std::size_t ball,
+                                    std::size_t frame) {
+    const auto off = adjustment.highlight_off_px(ball, frame);
+    if (!off || *off < least_highlight_reject_px) return std::nullopt;
+    const double sigmas = *off / input.balls[ball].highlights[frame]->sigma_px;
+    return sigmas > rejected_sigmas ? std::optional(sigmas) : std::nullopt;
+}
+
 /// The worst misfit of each frame at most: when two disagree, leaving out one is all that can be said.
 void judge_highlights(const RefineInput& input, const Adjustment& adjustment, std::vector<Believed>& believed,
                       std::vector<RejectedHighlight>& rejected) {
@@ -70,18 +80,41 @@ void judge_highlights(const RefineInput& input, const Adjustment& adjustment, st
         RejectedHighlight worst;
         double worst_sigmas = 0;
         for (std::size_t ball = 0; ball < input.balls.size(); ++ball) {
-            const auto off = adjustment.highlight_off_px(ball, frame);
-            if (!off || *off < least_highlight_reject_px) continue;
-            const double sigmas = *off / input.balls[ball].highlights[frame]->sigma_px;
-            if (sigmas > std::max(rejected_sigmas, worst_sigmas)) {
-                worst = {ball, frame, *off};
-                worst_sigmas = sigmas;
-            }
+            const auto sigmas = misfit_sigmas(input, adjustment, ball, frame);
+            if (!sigmas || *sigmas < worst_sigmas) continue;
+            worst = {ball, frame, *adjustment.highlight_off_px(ball, frame)};
+            worst_sigmas = *sigmas;
         }
         if (worst_sigmas == 0) continue;
         believed[worst.ball].highlight[frame] = 0;
         rejected.push_back(worst);
     }
+}
+
+/// Whether the description pulled the lamp off everything that its frame shows.
+bool no_highlight_fits(const RefineInput& input, const Adjustment& adjustment, std::size_t frame) {
+    std::size_t seen = 0, off = 0;
+    for (std::size_t ball = 0; ball < input.balls.size(); ++ball) {
+        if (!adjustment.highlight_off_px(ball, frame)) continue;
+        ++seen;
+        if (misfit_sigmas(input, adjustment, ball, frame)) ++off;
+    }
+    return seen > 0 && off == seen;
+}
+
+/// Takes the places from which lamps turn out to be missing out of the description. Returns their frames.
+std::vector<std::size_t> judge_description(const Adjustment& adjustment, RefineInput& input) {
+    std::vector<std::size_t> misplaced;
+    if (!input.nominal) return misplaced;
+    for (std::size_t frame = 0; frame < input.start.size(); ++frame) {
+        auto& place = input.nominal->position_in_rig_mm[frame];
+        const auto off = place ? adjustment.off_place_mm(frame, *place) : std::nullopt;
+        if (!off) continue;
+        if (*off < misplaced_slacks * input.nominal->slack_mm && !no_highlight_fits(input, adjustment, frame)) continue;
+        place.reset();
+        misplaced.push_back(frame);
+    }
+    return misplaced;
 }
 
 RefinedLight near_light(const Eigen::Vector3d& position, const Eigen::Matrix3d& covariance,
@@ -114,23 +147,31 @@ RefineResult refine(const RefineInput& input) {
     require_on_balls(input);
     RefineResult result;
     result.balls.resize(input.balls.size());
+    RefineInput trusted = input;  // less what the highlights contradict
     std::vector<Believed> believed = all_of(input);
+    std::vector<std::size_t> misplaced;
     for (int round = 0; round < most_rounds; ++round) {
-        Adjustment robust(input, believed, Loss::robust);
+        Adjustment robust(trusted, believed, Loss::robust);
         robust.solve();
         for (std::size_t i = 0; i < input.balls.size(); ++i) {
             const MirrorSphere sphere = robust.sphere(i);
             judge_contour(input.balls[i], robust.contour_distances_px(i), outline_of(input.view, sphere), believed[i],
                           result.balls[i]);
         }
+        const std::vector<std::size_t> missing = judge_description(robust, trusted);
+        misplaced.insert(misplaced.end(), missing.begin(), missing.end());
+        if (!missing.empty()) continue;  // highlights are judged without its pull
         const std::size_t before = result.rejected.size();
         judge_highlights(input, robust, believed, result.rejected);
         if (round > 0 && result.rejected.size() == before) break;
     }
-    Adjustment final(input, believed, Loss::squares);
+    Adjustment final(trusted, believed, Loss::squares);
     result.converged = final.solve();
     for (std::size_t i = 0; i < input.balls.size(); ++i) result.balls[i].sphere = final.sphere(i);
-    result.lights = lights_of(input, final);
+    for (const std::size_t frame : misplaced)
+        if (const auto off = final.off_place_mm(frame, *input.nominal->position_in_rig_mm[frame]))
+            result.misplaced.push_back({frame, *off});
+    result.lights = lights_of(trusted, final);
     return result;
 }
 

@@ -44,6 +44,12 @@ struct RejectedHighlight {
     double off_px = 0;
 };
 
+/// A lamp that does not stand where the rig's description has it.
+struct MisplacedLamp {
+    std::size_t frame = 0;
+    double off_mm = 0;
+};
+
 /// What became of one ball.
 struct RefinedBall {
     MirrorSphere sphere;
@@ -57,6 +63,7 @@ struct RefineResult {
     std::vector<RefinedBall> balls;
     std::vector<std::optional<RefinedLight>> lights;  ///< one per frame; none where no highlight is left
     std::vector<RejectedHighlight> rejected;
+    std::vector<MisplacedLamp> misplaced;
     bool converged = false;
 };
 
@@ -64,7 +71,8 @@ struct RefineResult {
 /// where the ball mirrors its lamp, the lamps about where the rig's description says. First with Cauchy's loss; what
 /// then lies off by more than four standard deviations is left out, the contour's own scatter and the likeness of
 /// neighbouring points are taken from what remains, and plain least squares on that gives values and covariances: they
-/// hold the balls' uncertainty as well as the highlights'.
+/// hold the balls' uncertainty as well as the highlights'. Where a frame's highlights and the rig's description
+/// contradict each other, the highlights are believed and the description of that lamp is left out.
 /// Throws InputError when a highlight lies off its ball.
 RefineResult refine(const RefineInput& input);
 

@@ -10,6 +10,13 @@
 
 namespace darkbox {
 
+Eigen::Vector3d SceneGeometry::point_at(int row, int column) const {
+    double z = 0;
+    if (!height_mm.empty())
+        if (const float known = height_mm(row, column); std::isfinite(known)) z = static_cast<double>(known);
+    return view->point_at(cv::Point2d(column, row), z);
+}
+
 LightField::LightField(const Lights& lights, const LightSet& set, SceneGeometry geometry, cv::Size picture)
     : lights_(lights), set_(set), geometry_(std::move(geometry)) {
     for (const SolverLight& used : set.lights)
@@ -26,20 +33,13 @@ LightField::LightField(const Lights& lights, const LightSet& set, SceneGeometry 
                          "give a height for each pixel of the photographs");
 }
 
-Eigen::Vector3d LightField::point_at(int row, int column) const {
-    double z = 0;
-    if (!geometry_.height_mm.empty())
-        if (const float known = geometry_.height_mm(row, column); std::isfinite(known)) z = static_cast<double>(known);
-    return geometry_.view->point_at(cv::Point2d(column, row), z);
-}
-
 void LightField::arrivals(int row, int column, std::vector<Arrival>& arrivals) const {
     arrivals.resize(size());
     if (uniform_) {
         for (std::size_t k = 0; k < size(); ++k) arrivals[k] = {set_.lights[k].direction, 1.0F};
         return;
     }
-    const Eigen::Vector3d point = point_at(row, column);
+    const Eigen::Vector3d point = geometry_.point_at(row, column);
     for (std::size_t k = 0; k < size(); ++k) {
         const Incidence light_there = incidence(light(k), point);
         arrivals[k] = {light_there.direction.cast<float>(), static_cast<float>(light_there.falloff)};
@@ -48,7 +48,7 @@ void LightField::arrivals(int row, int column, std::vector<Arrival>& arrivals) c
 
 Eigen::Vector3f LightField::to_camera(int row, int column) const {
     if (!geometry_.view || !geometry_.view->perspective()) return {0, 0, 1};
-    return geometry_.view->to_camera(point_at(row, column)).cast<float>();
+    return geometry_.view->to_camera(geometry_.point_at(row, column)).cast<float>();
 }
 
 }  // namespace darkbox

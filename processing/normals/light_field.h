@@ -16,6 +16,9 @@ struct SceneGeometry {
     std::optional<ViewGeometry> view;  ///< none: unknown, which distant lights can do without
     cv::Mat1f height_mm;  ///< z of each pixel's point, viewer frame; empty, or not finite at a pixel: z = 0. A first
                           ///< solution's integrated height refines near lights in a second one.
+
+    /// What a pixel of the picture shows, viewer frame, mm. `view` must be known.
+    Eigen::Vector3d point_at(int row, int column) const;
 };
 
 /// Light as it arrives at one pixel.
@@ -44,8 +47,6 @@ public:
     Eigen::Vector3f to_camera(int row, int column) const;
 
 private:
-    Eigen::Vector3d point_at(int row, int column) const;
-
     const Lights& lights_;
     const LightSet& set_;
     SceneGeometry geometry_;

@@ -174,9 +174,9 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
     summary.calibration = with_measured_intensities(session, std::move(summary.calibration), options.grey_card, work);
     if (options.from || given) append(summary.calibration.warnings, warnings_about(summary.calibration));
     warn_of_few_lights(summary.calibration);
-    if (options.described)
+    if (const auto described = described_lights(session))
         append(summary.calibration.warnings,
-               against_nominal(*options.described, {rig_of(session, lit), summary.calibration.lights, false}));
+               against_nominal(*described, {rig_of(session, lit), summary.calibration.lights, false}));
     remove_derived(session, {"results", "texels", "shading"});
     write_calibration(files.calibration, summary.calibration, rig_of(session, lit));
     write_lp(files.lights_lp, summary.calibration.lights);

@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "acquisition/frame/error.h"
+#include "processing/formats/calibration_file.h"
+#include "processing/formats/exr.h"
 #include "processing/formats/json_file.h"
 #include "processing/formats/light_files.h"
 #include "processing/formats/map_files.h"
@@ -74,10 +76,12 @@ Solver solver_of_results(const ResultFiles& files) {
                         [&] { return solver_named(json.at("solver").get<std::string>()); });
 }
 
-PhotometricStereoOptions solving_with(Solver solver) {
-    PhotometricStereoOptions options;
-    options.solver = solver;
-    return options;
+/// Where the surface lies: as the session's results have it; where there are none, in the plane of the object.
+SceneGeometry geometry_of(const ResultFiles& files) {
+    SceneGeometry geometry;
+    geometry.view = read_calibration(files.calibration).calibration.view;
+    if (geometry.view && fs::exists(files.height)) geometry.height_mm = read_exr_channel(files.height, "Y");
+    return geometry;
 }
 
 /// The session's photographs are read, and solved, only when something asks for them.
@@ -87,6 +91,7 @@ public:
         : session_(session), options_(options), work_(work), files_(session.folder()) {
         lights_ = lights_without(load_lights(session), options.drop);
         solver_ = options.solver ? *options.solver : solver_of_results(files_);
+        geometry_ = geometry_of(files_);
     }
 
     const Lights& lights() const { return lights_; }
@@ -95,6 +100,13 @@ public:
     const PhotoStack& stack() {
         if (!stack_) stack_ = load_stack(session_, work_);
         return *stack_;
+    }
+
+    PhotometricStereoOptions solving_with(Solver solver) const {
+        PhotometricStereoOptions options;
+        options.solver = solver;
+        options.geometry = geometry_;
+        return options;
     }
 
     PhotometricStereoResult solve(Solver solver) {
@@ -117,6 +129,7 @@ private:
     ResultFiles files_;
     Lights lights_;
     Solver solver_ = Solver::lsq;
+    SceneGeometry geometry_;
     std::optional<PhotoStack> stack_;
 };
 
@@ -167,7 +180,7 @@ void leave_lights_out(Bench& bench, const WorkContext& work, Evaluation& evaluat
     const std::vector<Predictor> predictors{lambert_predictor()};
     for (const Predictor& predictor : predictors) evaluation.predictors.push_back(predictor.name);
     evaluation.held_out = leave_one_light_out(bench.stack(), bench.lights(), bench.solve(Solver::robust), predictors,
-                                              solving_with(bench.solver()), work);
+                                              bench.solving_with(bench.solver()), work);
     for (const HeldOutLight& light : evaluation.held_out)
         if (light.errors.empty())
             evaluation.warnings.push_back(

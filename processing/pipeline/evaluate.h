@@ -64,7 +64,8 @@ struct Evaluation {
 };
 
 /// Measures a calibrated session; nothing is written. Angular errors are those of the stored results, or of a fit in
-/// memory where there are none or where `solver` or `drop` ask for another. No stage computes with the truth;
+/// memory where there are none or where `solver` or `drop` ask for another; near lights then fall on the surface of the
+/// stored results. No stage computes with the truth;
 /// run_normals only reports its error against an import's. Throws InputError when the session is not calibrated, when
 /// `truth` or `compare` ask for a truth that is not there, or a frame to drop is not one of the session.
 Evaluation evaluate_session(const Session& session, const EvaluateOptions& options = {}, const WorkContext& work = {});

@@ -18,8 +18,17 @@ constexpr double hull_tolerance = 1e-6;  // of the plane's coordinates
 
 double mean_of(const cv::Vec3f& v) { return (static_cast<double>(v[0]) + v[1] + v[2]) / 3; }
 
-double n_dot_l(const cv::Vec3f& n, const Light& light) {
-    return light.direction.dot(Eigen::Vector3d(n[0], n[1], n[2]));
+/// N.L of each valid pixel, of a near light times its fall-off there.
+cv::Mat1d shading_under(const Light& light, const NormalMap& normals, const SceneGeometry& geometry) {
+    cv::Mat1d shading(normals.normal.size(), 0.0);
+    for (int y = 0; y < shading.rows; ++y)
+        for (int x = 0; x < shading.cols; ++x) {
+            if (normals.valid(y, x) == 0) continue;
+            const cv::Vec3f& n = normals.normal(y, x);
+            const Incidence at = light.near ? incidence(light, geometry.point_at(y, x)) : Incidence{light.direction, 1};
+            shading(y, x) = at.direction.dot(Eigen::Vector3d(n[0], n[1], n[2])) * at.falloff;
+        }
+    return shading;
 }
 
 /// One pixel of a photograph as a light of intensity 1 would have made it, channel mean.
@@ -35,16 +44,16 @@ PixelKind kind_of(double observed, double shading, double albedo) {
 
 /// The kind of each pixel of one photograph, as an index into pixel_kinds; `all` (0) where nothing is compared.
 cv::Mat1b kinds_of(const PhotoStack& stack, std::size_t image, const Light& light,
-                   const PhotometricStereoResult& reference) {
+                   const PhotometricStereoResult& reference, const SceneGeometry& geometry) {
+    const cv::Mat1d shading = shading_under(light, reference.normals, geometry);
     cv::Mat1b kinds(stack.size(), static_cast<uchar>(PixelKind::all));
     for (int y = 0; y < kinds.rows; ++y)
         for (int x = 0; x < kinds.cols; ++x) {
             if (reference.normals.valid(y, x) == 0) continue;
-            const PixelKind kind =
-                stack.clipped[image](y, x) != 0
-                    ? PixelKind::highlight
-                    : kind_of(normalised(stack.images[image](y, x), light),
-                              n_dot_l(reference.normals.normal(y, x), light), mean_of(reference.albedo.albedo(y, x)));
+            const PixelKind kind = stack.clipped[image](y, x) != 0
+                                       ? PixelKind::highlight
+                                       : kind_of(normalised(stack.images[image](y, x), light), shading(y, x),
+                                                 mean_of(reference.albedo.albedo(y, x)));
             kinds(y, x) = static_cast<uchar>(kind);
         }
     return kinds;
@@ -136,14 +145,15 @@ const char* name(PixelKind kind) {
 Predictor lambert_predictor() {
     return {"lambert", [](const HeldOutTraining& training, const Light& light) {
                 const PhotometricStereoResult& solved = training.solved;
+                const cv::Mat1d shading = shading_under(light, solved.normals, training.geometry);
                 cv::Mat3f image(training.stack.size(), cv::Vec3f::all(0));
                 for (int y = 0; y < image.rows; ++y)
                     for (int x = 0; x < image.cols; ++x) {
                         if (solved.normals.valid(y, x) == 0) continue;
-                        const double shading = std::max(0.0, n_dot_l(solved.normals.normal(y, x), light));
                         const cv::Vec3f& albedo = solved.albedo.albedo(y, x);
                         for (int c = 0; c < 3; ++c)
-                            image(y, x)[c] = static_cast<float>(albedo[c] * shading * light.intensity[c]);
+                            image(y, x)[c] =
+                                static_cast<float>(albedo[c] * std::max(0.0, shading(y, x)) * light.intensity[c]);
                     }
                 return image;
             }};
@@ -214,10 +224,10 @@ std::vector<HeldOutLight> leave_one_light_out(const PhotoStack& stack, const Lig
         const PhotometricStereoResult solved =
             photometric_stereo(stack, others, options, {.report = {}, .stop = work.stop, .threads = work.threads});
         result.normal_change_deg = mean_change_deg(solved.normals, whole.normals);
-        const cv::Mat1b kinds = kinds_of(stack, i, lights[i], reference);
+        const cv::Mat1b kinds = kinds_of(stack, i, lights[i], reference, options.geometry);
         for (const Predictor& predictor : predictors)
-            result.errors.push_back(compare(predictor.predict({stack, others, solved}, lights[i]), stack.images[i],
-                                            stack.clipped[i], kinds));
+            result.errors.push_back(compare(predictor.predict({stack, others, solved, options.geometry}, lights[i]),
+                                            stack.images[i], stack.clipped[i], kinds));
     }
     step(work, {"leaving lights out", lights.size(), lights.size(), ""});
     return results;

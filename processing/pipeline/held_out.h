@@ -21,6 +21,7 @@ struct HeldOutTraining {
     const PhotoStack& stack;                ///< the held-out photograph is in it, but its light is not `used`
     const Lights& lights;                   ///< `used` is false for the held-out one
     const PhotometricStereoResult& solved;  ///< fitted to the used ones
+    const SceneGeometry& geometry;          ///< for near lights
 };
 
 /// Draws the held-out photograph under `light`: linear radiance, of the stack's size. Names as `--json` shows them.
@@ -29,7 +30,7 @@ struct Predictor {
     std::function<cv::Mat3f(const HeldOutTraining& training, const Light& light)> predict;
 };
 
-/// "lambert": albedo times max(0, N.L) times the light's intensity.
+/// "lambert": albedo times max(0, N.L) times the light's intensity, of a near light as it arrives at the pixel.
 Predictor lambert_predictor();
 
 /// Every pixel of the object, and three kinds of them apart.

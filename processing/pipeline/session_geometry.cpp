@@ -19,6 +19,10 @@ std::optional<ViewGeometry> view_of(const CaptureGeometry& geometry, cv::Size si
     return view;
 }
 
+Eigen::Vector3d in_rig_mm(const NominalLamp& lamp) {
+    return {lamp.position_mm[0], lamp.position_mm[1], lamp.position_mm[2]};
+}
+
 std::optional<NominalLamps> nominal_of(const CaptureGeometry& geometry, const std::vector<FrameRecord>& lit) {
     NominalLamps nominal;
     for (const FrameRecord& frame : lit) {
@@ -26,8 +30,7 @@ std::optional<NominalLamps> nominal_of(const CaptureGeometry& geometry, const st
                                         [&](const NominalLamp& lamp) { return lamp.name == frame.lamp_name; });
         nominal.position_in_rig_mm.emplace_back();
         if (named == geometry.lamps.end()) continue;
-        const auto& p = named->position_mm;
-        nominal.position_in_rig_mm.back() = Eigen::Vector3d(p[0], p[1], p[2]);
+        nominal.position_in_rig_mm.back() = in_rig_mm(*named);
     }
     const bool any = std::any_of(nominal.position_in_rig_mm.begin(), nominal.position_in_rig_mm.end(),
                                  [](const auto& place) { return bool(place); });
@@ -46,6 +49,20 @@ CalibrationOptions with_geometry(const Session& session, CalibrationOptions opti
     if (!options.nominal && options.lamps != LampModel::distant)
         options.nominal = nominal_of(*geometry, frames_of_kind(session, FrameKind::lit));
     return options;
+}
+
+std::optional<RigLights> described_lights(const Session& session) {
+    const auto& geometry = session.info().geometry;
+    if (!geometry || geometry->lamps.empty()) return std::nullopt;
+    RigLights described{{session.info().rig, {}}, {}, false};
+    for (const NominalLamp& lamp : geometry->lamps) {
+        Light light;
+        light.file = lamp.name;
+        light.direction = in_rig_mm(lamp).normalized();
+        described.rig.lamps.push_back(lamp.name);
+        described.lights.push_back(light);
+    }
+    return described;
 }
 
 std::optional<cv::Point2d> object_centroid(const Session& session) {

@@ -2,6 +2,7 @@
 
 #include "acquisition/session/session.h"
 #include "processing/calibration/calibration.h"
+#include "processing/calibration/drift.h"
 
 namespace darkbox {
 
@@ -9,6 +10,10 @@ namespace darkbox {
 /// ball's diameter, and each lit frame's nominal lamp. Near lamps are only thought of where the session does not say
 /// that their light is parallel. `size` is of the frames that show the ball.
 CalibrationOptions with_geometry(const Session& session, CalibrationOptions options, cv::Size size);
+
+/// Where the rig's description has the lamps, as directions from the rig frame's origin at the object; for warnings.
+/// No value where the session does not know it.
+std::optional<RigLights> described_lights(const Session& session);
 
 /// Where the object's mask, if the session has one, has its centroid.
 std::optional<cv::Point2d> object_centroid(const Session& session);

@@ -8,7 +8,6 @@
 #include "acquisition/frame/progress.h"
 #include "acquisition/session/session.h"
 #include "processing/calibration/calibration.h"
-#include "processing/calibration/drift.h"
 #include "processing/calibration/intensity.h"
 #include "processing/formats/ply.h"
 #include "processing/normals/photometric_stereo.h"
@@ -35,7 +34,6 @@ struct CalibrateOptions {
     std::optional<std::filesystem::path> ball_mask;  ///< a picture that is white on the ball or balls
     std::optional<std::filesystem::path> from;  ///< a lights.json, or a session that has one: its lights are reused
     std::optional<GreyCard> grey_card;          ///< in view in the lit frames: tells intensities
-    std::optional<RigLights> described;         ///< where the rig's description has the lamps; for warnings
 };
 struct CalibrateSummary {
     Calibration calibration;

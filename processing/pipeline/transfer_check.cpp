@@ -27,13 +27,19 @@ std::vector<PhotoRows> under_other_curve(std::vector<PhotoRows> photos, Transfer
     return photos;
 }
 
+/// Some rows do not tell where in the picture they lie. What near lamps then leave unexplained is in both residuals.
+Lights as_distant(Lights lights) {
+    for (Light& light : lights) light.near.reset();
+    return lights;
+}
+
 /// The residual as a share of the mean radiance.
 double relative_residual(const std::vector<PhotoRows>& photos, const cv::Mat1b& mask, const Lights& lights,
                          const WorkContext& work) {
     PhotosInMemory source(photos, {}, mask);
     WorkContext silent = work;
     silent.report = nullptr;
-    return photometric_stereo(source, lights, {}, silent).residual_rms / mean_radiance(photos, mask);
+    return photometric_stereo(source, as_distant(lights), {}, silent).residual_rms / mean_radiance(photos, mask);
 }
 
 }  // namespace

@@ -7,7 +7,6 @@
 #include "processing/pipeline/summary_json.h"
 #include "rig/cli/arguments.h"
 #include "rig/cli/commands.h"
-#include "rig/cli/described_lamps.h"
 
 namespace darkbox {
 namespace {
@@ -31,7 +30,6 @@ ProcessOptions options_of(const Arguments& arguments) {
     if (!arguments.from.empty()) options.calibrate.from = arguments.from;
     for (const std::string& text : arguments.highlights) calibration.highlights.push_back(parse_highlight(text));
     if (!arguments.grey_card.empty()) options.calibrate.grey_card = parse_grey_card(arguments.grey_card);
-    options.calibrate.described = described_lamps(arguments.session);
     return options;
 }
 

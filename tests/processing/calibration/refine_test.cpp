@@ -221,6 +221,26 @@ TEST(Refine, OneBallAndTheRigsGeometryTellNearLamps) {
     }
 }
 
+TEST(Refine, AHighlightIsBelievedAgainstTheDescriptionOfItsLamp) {
+    for (const double off_mm : {150.0, 400.0, 900.0}) {
+        Truth truth;
+        truth.lamps = LampModel::near;
+        const auto lamps = lamps_of(truth, 12);
+        RefineInput input = measured(truth, lamps, 0.05, 0.03, 3);
+        input.nominal.emplace();
+        for (const auto& lamp : lamps) input.nominal->position_in_rig_mm.emplace_back(lamp);
+        *input.nominal->position_in_rig_mm[4] += off_mm * lamps[4].unitOrthogonal();
+        const RefineResult result = refine(input);
+        EXPECT_TRUE(result.rejected.empty());
+        ASSERT_EQ(result.misplaced.size(), 1U) << off_mm;
+        EXPECT_EQ(result.misplaced[0].frame, 4U);
+        ASSERT_TRUE(result.lights[4]);
+        EXPECT_LT(angle_deg(result.lights[4]->direction, truth.direction(lamps[4])), 1.0) << off_mm;
+        for (const std::size_t other : {0U, 3U, 7U, 11U})
+            EXPECT_LT(angle_deg(result.lights[other]->direction, truth.direction(lamps[other])), 0.15);
+    }
+}
+
 TEST(Refine, ASingleBallAloneLeavesTheDistanceOpenAndSaysSo) {
     Truth truth;
     truth.lamps = LampModel::near;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "tests/processing/normals/lit_sphere.h"
 #include "tests/support/textured_sphere.h"
 #include "tests/support/throws.h"
 
@@ -42,6 +43,23 @@ TEST(HeldOut, LambertPredictsALambertSphereExactly) {
         EXPECT_FALSE(light.errors[0][shadowed]);
         EXPECT_FALSE(light.errors[0][highlight]);
         EXPECT_LT(light.normal_change_deg, 1e-3);
+    }
+}
+
+TEST(HeldOut, NearLightsFallOnTheSurface) {
+    Lights lamps = test::spiral_lights(8, 50);
+    for (Light& light : lamps) light.near = LampPosition{light.direction * 150, {0, 0, 0}};
+    test::LitSphere sphere(lamps, test::lambert, 48, 25);
+    for (int y = 0; y < 48; ++y)
+        for (int x = 0; x < 48; ++x)
+            if (std::hypot(x - 23.5, y - 23.5) > 10) sphere.stack.mask(y, x) = 0;  // the rest is not lit by all
+    PhotometricStereoOptions options;
+    options.geometry = {sphere.view(), sphere.height_mm()};
+    const auto reference = photometric_stereo(sphere.stack, sphere.lights, options);
+    for (const HeldOutLight& light :
+         leave_one_light_out(sphere.stack, sphere.lights, reference, {lambert_predictor()}, options)) {
+        EXPECT_LT(light.errors.at(0)[all]->rmse_relative, 1e-4) << light.file;
+        EXPECT_FALSE(light.errors[0][shadowed] || light.errors[0][highlight]);
     }
 }
 

@@ -2,14 +2,9 @@
 
 #include <gmock/gmock.h>
 
-#include <filesystem>
-#include <fstream>
-
 #include "acquisition/frame/error.h"
 #include "processing/calibration/rig_plan.h"
-#include "rig/cli/described_lamps.h"
 #include "rig/description/rig_description.h"
-#include "tests/support/test_data.h"
 
 namespace darkbox {
 namespace {
@@ -44,21 +39,6 @@ TEST(LampsOfAPlan, MakeARigThatCanBeRead) {
     for (std::size_t i = 0; i < 5; ++i)
         for (std::size_t axis = 0; axis < 3; ++axis)
             EXPECT_NEAR(rig.lamps[i].position_mm[axis], plan.positions_mm[i][static_cast<Eigen::Index>(axis)], 0.051);
-}
-
-TEST(DescribedLamps, AreReadFromTheSessionsOwnDescription) {
-    const test::TemporaryFolder folder;
-    EXPECT_FALSE(described_lamps(folder.path()));
-    std::filesystem::create_directories(folder.path() / "data");
-    std::ofstream(folder.path() / "data/rig.toml") << simulated_rig_toml(6);
-    const auto described = described_lamps(folder.path());
-    ASSERT_TRUE(described);
-    EXPECT_EQ(described->rig.name, "simulated-6");
-    ASSERT_EQ(described->lights.size(), 6u);
-    EXPECT_EQ(described->rig.lamps.front(), "lamp-01");
-    EXPECT_NEAR(described->lights.front().direction.norm(), 1, 1e-9);
-    std::ofstream(folder.path() / "data/rig.toml") << "nothing";
-    EXPECT_FALSE(described_lamps(folder.path()));
 }
 
 }  // namespace
