@@ -49,6 +49,9 @@ public:
             bytes = bytes.subspan(static_cast<std::size_t>(written));
         }
     }
+    void seek(std::uint64_t position) {
+        if (::lseek(fd_, static_cast<off_t>(position), SEEK_SET) < 0) fail("write", path_, errno);
+    }
     void flush() {
         if (::fsync(fd_) != 0) fail("flush", path_, errno);
     }
@@ -71,6 +74,7 @@ AtomicFile::~AtomicFile() {
 
 void AtomicFile::write(std::span<const std::byte> bytes) { file_->write(bytes); }
 void AtomicFile::write(std::string_view text) { write(std::as_bytes(std::span(text))); }
+void AtomicFile::seek(std::uint64_t position) { file_->seek(position); }
 
 void AtomicFile::commit() {
     file_->flush();

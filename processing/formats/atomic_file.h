@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <span>
@@ -27,6 +28,8 @@ public:
 
     void write(std::span<const std::byte> bytes);
     void write(std::string_view text);
+    /// The next write() goes there, `position` bytes from the start: for tables that come before what they count.
+    void seek(std::uint64_t position);
     void commit();
 
 private:

@@ -10,7 +10,9 @@
 
 #include <algorithm>
 #include <cstring>
+#include <exception>
 #include <mutex>
+#include <string_view>
 
 #include "processing/formats/atomic_file.h"
 #include "processing/formats/exr_codec.h"
@@ -44,6 +46,35 @@ public:
 private:
     Bytes bytes_;
     std::size_t position_ = 0;
+};
+
+/// Lets the library write to a file. It drops errors of what it writes at its very end; they are kept here.
+class FileStream : public Imf::OStream {
+public:
+    FileStream(AtomicFile& file, const std::string& name) : Imf::OStream(name.c_str()), file_(file) {}
+
+    void write(const char bytes[], int count) override {
+        try {
+            file_.write(std::string_view(bytes, static_cast<std::size_t>(count)));
+        } catch (...) {
+            failure_ = std::current_exception();
+            throw;
+        }
+        position_ += static_cast<std::uint64_t>(count);
+    }
+    uint64_t tellp() override { return position_; }
+    void seekp(uint64_t position) override {
+        file_.seek(position);
+        position_ = position;
+    }
+    void rethrow_failure() const {
+        if (failure_) std::rethrow_exception(failure_);
+    }
+
+private:
+    AtomicFile& file_;
+    std::uint64_t position_ = 0;
+    std::exception_ptr failure_;
 };
 
 Imf::Slice slice_of(cv::Mat1f& values, const Imath::Box2i& window) {
@@ -114,33 +145,54 @@ cv::Mat3f colour_of(const std::vector<ExrChannel>& channels, const std::string& 
     return image;
 }
 
+void write_exr_rows(const fs::path& path, cv::Size size, const std::vector<std::string>& channels,
+                    const FillExrRow& fill) {
+    if (channels.empty() || size.empty())
+        throw InputError(fmt::format("{} would have no channels or no pixels", path.string()), "report this as a bug");
+    Imf::Header header(size.width, size.height);
+    header.compression() = Imf::RLE_COMPRESSION;
+    std::vector<float> samples(channels.size() * static_cast<std::size_t>(size.width));
+    Imf::FrameBuffer buffer;
+    for (std::size_t c = 0; c < channels.size(); ++c) {
+        header.channels().insert(channels[c], Imf::Channel(Imf::FLOAT));
+        constexpr std::size_t same_place_for_all_rows = 0;
+        buffer.insert(channels[c], Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(samples.data() + c),
+                                              channels.size() * sizeof(float), same_place_for_all_rows));
+    }
+    AtomicFile file(path);
+    FileStream stream(file, path.string());
+    {
+        Imf::OutputFile output(stream, header, 0);
+        output.setFrameBuffer(buffer);
+        for (int row = 0; row < size.height; ++row) {
+            fill(row, samples.data());
+            output.writePixels(1);
+        }
+    }
+    stream.rethrow_failure();
+    file.commit();
+}
+
 void write_exr(const fs::path& path, const std::vector<ExrChannel>& channels) {
     if (channels.empty())
         throw InputError(fmt::format("{} would have no channels", path.string()), "report this as a bug");
     require_alike(channels, path);
+    std::vector<std::string> names;
+    for (const ExrChannel& channel : channels) names.push_back(channel.name);
     const cv::Size size = channels.front().values.size();
-    Imf::Header header(size.width, size.height);
-    header.compression() = Imf::ZIP_COMPRESSION;
-    Imf::FrameBuffer buffer;
-    std::vector<cv::Mat1f> rows;  // continuous, and alive until written
-    for (const ExrChannel& channel : channels) {
-        header.channels().insert(channel.name, Imf::Channel(Imf::FLOAT));
-        rows.push_back(channel.values.isContinuous() ? channel.values : cv::Mat1f(channel.values.clone()));
-        buffer.insert(channel.name, slice_of(rows.back(), header.dataWindow()));
-    }
-    Imf::StdOSStream stream;
-    {
-        Imf::OutputFile output(stream, header, 1);
-        output.setFrameBuffer(buffer);
-        output.writePixels(size.height);
-    }
-    write_file(path, stream.str());
+    write_exr_rows(path, size, names, [&](int row, float* samples) {
+        for (std::size_t c = 0; c < channels.size(); ++c) {
+            const float* values = channels[c].values[row];
+            float* to = samples + c;
+            for (int x = 0; x < size.width; ++x, to += channels.size()) *to = values[x];
+        }
+    });
 }
 
 void write_exr(const fs::path& path, const cv::Mat3f& image) {
-    std::vector<cv::Mat> planes;
-    cv::split(image, planes);
-    write_exr(path, {{"R", planes[0]}, {"G", planes[1]}, {"B", planes[2]}});
+    write_exr_rows(path, image.size(), {"R", "G", "B"}, [&](int row, float* samples) {
+        std::copy_n(image[row]->val, std::ptrdiff_t{3} * image.cols, samples);
+    });
 }
 
 void write_exr(const fs::path& path, const cv::Mat1f& image) { write_exr(path, std::vector<ExrChannel>{{"Y", image}}); }

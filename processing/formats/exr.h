@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
@@ -14,12 +15,19 @@ struct ExrChannel {
     cv::Mat1f values;
 };
 
-/// Writes 32-bit float, ZIP-compressed, without loss. Throws InputError when the channels differ in size or are empty.
+/// Writes 32-bit float without loss. Run lengths make little of what is outside an object and cost next to nothing;
+/// what is on it is noise to any codec. Throws InputError when the channels differ in size or are empty.
 void write_exr(const std::filesystem::path& path, const std::vector<ExrChannel>& channels);
 /// Channels R, G, B.
 void write_exr(const std::filesystem::path& path, const cv::Mat3f& image);
 /// Channel Y.
 void write_exr(const std::filesystem::path& path, const cv::Mat1f& image);
+
+/// Puts one row's samples in place, the channels of one pixel after the other.
+using FillExrRow = std::function<void(int row, float* samples)>;
+/// For pictures that need not be in memory as they are written.
+void write_exr_rows(const std::filesystem::path& path, cv::Size size, const std::vector<std::string>& channels,
+                    const FillExrRow& fill);
 
 /// One channel by name, as float. Throws InputError when the file is damaged or has no such channel.
 cv::Mat1f read_exr_channel(const std::filesystem::path& path, const std::string& channel);

@@ -23,15 +23,7 @@ bool is_exr(const fs::path& path) { return picture_format_of(path) == PictureFor
 
 ushort encoded(float component) { return cv::saturate_cast<ushort>((component + 1.0F) / 2.0F * full); }
 
-cv::Mat3w encoded(const NormalMap& normals) {
-    cv::Mat3w image(normals.normal.size(), cv::Vec3w(0, 0, 0));
-    for (int y = 0; y < image.rows; ++y)
-        for (int x = 0; x < image.cols; ++x) {
-            const cv::Vec3f& n = normals.normal(y, x);
-            if (normals.valid(y, x)) image(y, x) = {encoded(n[0]), encoded(n[1]), encoded(n[2])};
-        }
-    return image;
-}
+cv::Vec3w encoded(const cv::Vec3f& normal) { return {encoded(normal[0]), encoded(normal[1]), encoded(normal[2])}; }
 
 /// Components in -1...1, whatever the file's kind.
 cv::Mat3f components_of(const fs::path& path) {
@@ -42,10 +34,12 @@ cv::Mat3f components_of(const fs::path& path) {
     return components;
 }
 
-cv::Mat3f inside(const cv::Mat3f& image, const cv::Mat1b& valid) {
-    cv::Mat3f kept(image.size(), cv::Vec3f(0, 0, 0));
-    image.copyTo(kept, valid);
-    return kept;
+/// R, G, B; zeros where the map is not valid.
+void write_inside(const fs::path& path, const cv::Mat3f& image, const cv::Mat1b& valid) {
+    write_exr_rows(path, image.size(), {"R", "G", "B"}, [&](int row, float* samples) {
+        for (int x = 0; x < image.cols; ++x, samples += 3)
+            for (int c = 0; c < 3; ++c) samples[c] = valid(row, x) ? image(row, x)[c] : 0.0F;
+    });
 }
 
 cv::Mat1b above_zero(const cv::Mat3f& image) {
@@ -75,10 +69,12 @@ cv::Mat require_16_bit(const fs::path& path, int channels) {
 }  // namespace
 
 void write_normal_map(const fs::path& path, const NormalMap& normals) {
-    if (is_exr(path))
-        write_exr(path, inside(normals.normal, normals.valid));
-    else
-        write_png(path, encoded(normals));
+    if (is_exr(path)) return write_inside(path, normals.normal, normals.valid);
+    write_png_rows(path, normals.normal.size(), CV_16UC3, [&](int row, uchar* samples) {
+        auto* pixels = reinterpret_cast<cv::Vec3w*>(samples);
+        for (int x = 0; x < normals.normal.cols; ++x)
+            pixels[x] = normals.valid(row, x) ? encoded(normals.normal(row, x)) : cv::Vec3w(0, 0, 0);
+    });
 }
 
 NormalMap read_normal_map(const fs::path& path) { return read_normal_map(path, cv::Mat1b()); }
@@ -102,11 +98,12 @@ NormalMap read_normal_map(const fs::path& path, const cv::Mat1b& mask) {
 }
 
 void write_albedo_map(const fs::path& path, const AlbedoMap& albedo, double gain) {
-    const cv::Mat3f kept = inside(albedo.albedo, albedo.valid);
-    if (is_exr(path))
-        write_exr(path, kept);
-    else
-        write_png(path, viewable(kept, gain));
+    if (is_exr(path)) return write_inside(path, albedo.albedo, albedo.valid);
+    write_png_rows(path, albedo.albedo.size(), CV_8UC3, [&](int row, uchar* samples) {
+        cv::Mat3b pixels(1, albedo.albedo.cols, reinterpret_cast<cv::Vec3b*>(samples));
+        viewable(albedo.albedo.row(row), gain).copyTo(pixels);
+        pixels.setTo(cv::Vec3b(0, 0, 0), albedo.valid.row(row) == 0);
+    });
 }
 
 AlbedoMap read_albedo_map(const fs::path& path, const cv::Mat1b& mask) {

@@ -9,33 +9,17 @@
 #include "processing/formats/picture_header.h"
 
 namespace darkbox {
-namespace {
 
-cv::Mat for_codec(const cv::Mat& image) {
-    if (image.channels() != 3) return image;
-    cv::Mat bgr;
-    cv::cvtColor(image, bgr, cv::COLOR_RGB2BGR);
-    return bgr;
-}
-
-std::vector<std::byte> encode(const char* extension, const cv::Mat& image, const std::vector<int>& parameters) {
+std::vector<std::byte> encode_jpeg(const cv::Mat3b& image, int quality) {
     std::vector<uchar> bytes;
-    if (image.empty() || !cv::imencode(extension, for_codec(image), bytes, parameters))
+    cv::Mat3b bgr;
+    if (!image.empty()) cv::cvtColor(image, bgr, cv::COLOR_RGB2BGR);
+    if (image.empty() || !cv::imencode(".jpg", bgr, bytes, {cv::IMWRITE_JPEG_QUALITY, quality}))
         throw InputError(fmt::format("cannot encode a picture of {}x{} pixels", image.cols, image.rows),
                          "report this as a bug");
     const auto* first = reinterpret_cast<const std::byte*>(bytes.data());
     return {first, first + bytes.size()};
 }
-
-}  // namespace
-
-std::vector<std::byte> encode_png(const cv::Mat& image) { return encode(".png", image, {}); }
-
-std::vector<std::byte> encode_jpeg(const cv::Mat3b& image, int quality) {
-    return encode(".jpg", image, {cv::IMWRITE_JPEG_QUALITY, quality});
-}
-
-void write_png(const std::filesystem::path& path, const cv::Mat& image) { write_file(path, encode_png(image)); }
 
 cv::Mat read_png(const std::filesystem::path& path) {
     const std::vector<std::byte> bytes = read_file(path);

@@ -45,7 +45,6 @@ std::vector<std::size_t> load_samples(const PhotoBand& band, const LightSet& set
         const SolverLight& light = set.lights[k];
         if (load_photo(band.photos[light.image], place.row, place.column, light.gain, k, block)) clipped.push_back(k);
     }
-    block.samples_used.at.fill(static_cast<float>(set.lights.size()));
     return clipped;
 }
 
@@ -130,6 +129,15 @@ void leave_out_clipped(const PhotoBand& band, const LightSet& set, Place place,
     }
 }
 
+/// Returns how many pixels of the object are not finite.
+std::size_t sum_loaded_samples(const PhotoBand& band, const LightSet& set, Place place, LeastSquaresBlock& block) {
+    const std::vector<std::size_t> clipped = load_samples(band, set, place, block);
+    const std::size_t not_finite = project(set, block);
+    accumulate_albedo(set, block);
+    if (!clipped.empty()) leave_out_clipped(band, set, place, clipped, block);
+    return not_finite;
+}
+
 void write_nothing(Place place, int row, int count, SolvedMaps& maps) {
     const int c = place.column;
     std::fill_n(maps.normal[row] + c, count, cv::Vec3f::all(0));
@@ -173,10 +181,11 @@ std::size_t solve_row_least_squares(const PhotoBand& band, const LightSet& set, 
             write_nothing(place, map_row, block.count, maps);
             continue;
         }
-        const std::vector<std::size_t> clipped = load_samples(band, set, place, block);
-        not_finite += project(set, block);
-        accumulate_albedo(set, block);
-        if (!clipped.empty()) leave_out_clipped(band, set, place, clipped, block);
+        block.samples_used.at.fill(static_cast<float>(set.lights.size()));
+        if (const auto plain = sum_plain_samples(band, set, row, c, block))
+            not_finite += *plain;
+        else
+            not_finite += sum_loaded_samples(band, set, place, block);
         finish(min_albedo, block,
                {maps.normal[map_row][c].val, maps.albedo[map_row][c].val, maps.residual[map_row] + c,
                 maps.valid[map_row] + c, maps.lights_used[map_row] + c});

@@ -98,9 +98,14 @@ bool load_photo(const PhotoRows& rows, int row, int column, const std::array<flo
     }
 }
 
-inline Vector mean_sample(const Plane* rgb, std::size_t i) {
-    const Vector sum = hn::Add(hn::Add(load(rgb[0], i), load(rgb[1], i)), load(rgb[2], i));
-    return hn::Mul(sum, hn::Set(Floats(), 1.0F / 3.0F));
+struct Colour {
+    Vector r, g, b;
+};
+
+inline Vector mean(const Colour& c) { return hn::Mul(hn::Add(hn::Add(c.r, c.g), c.b), hn::Set(Floats(), 1.0F / 3.0F)); }
+
+inline Colour load_colour(const Plane* rgb, std::size_t i) {
+    return {load(rgb[0], i), load(rgb[1], i), load(rgb[2], i)};
 }
 
 /// All bits set where a byte of the mask is not 0.
@@ -110,18 +115,22 @@ inline hn::Mask<Floats> inside(const LeastSquaresBlock& block, std::size_t i) {
     return hn::RebindMask(Floats(), hn::Gt(hn::PromoteTo(words, bytes), hn::Zero(words)));
 }
 
-std::size_t project(const LightSet& set, LeastSquaresBlock& block) {
-    const Floats d;
-    std::size_t not_finite = 0;
-    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); i += lanes()) {
-        Vector x = hn::Zero(d), y = hn::Zero(d), z = hn::Zero(d);
-        for (std::size_t k = 0; k < set.lights.size(); ++k) {
-            const float* p = set.lights[k].pseudo_column.data();
-            const Vector mean = mean_sample(block.rgb(k), i);
-            x = hn::Add(x, hn::Mul(hn::Set(d, p[0]), mean));
-            y = hn::Add(y, hn::Mul(hn::Set(d, p[1]), mean));
-            z = hn::Add(z, hn::Mul(hn::Set(d, p[2]), mean));
-        }
+/// Sums over lights of what leads to g.
+struct Projection {
+    Vector x, y, z;
+
+    void add(const SolverLight& light, const Colour& sample) {
+        const Floats d;
+        const float* p = light.pseudo_column.data();
+        const Vector grey = mean(sample);
+        x = hn::Add(x, hn::Mul(hn::Set(d, p[0]), grey));
+        y = hn::Add(y, hn::Mul(hn::Set(d, p[1]), grey));
+        z = hn::Add(z, hn::Mul(hn::Set(d, p[2]), grey));
+    }
+
+    /// Returns how many pixels of the object are not finite.
+    std::size_t put(std::size_t i, LeastSquaresBlock& block) const {
+        const Floats d;
         store(x, block.g[0], i);
         store(y, block.g[1], i);
         store(z, block.g[2], i);
@@ -129,35 +138,115 @@ std::size_t project(const LightSet& set, LeastSquaresBlock& block) {
         const Vector trace = hn::Mul(hn::Add(hn::Add(x, y), z), hn::Zero(d));
         const auto finite = hn::Eq(trace, hn::Zero(d)), object = inside(block, i);
         store(hn::IfThenElseZero(hn::And(finite, object), hn::Set(d, 1.0F)), block.usable, i);
-        not_finite += hn::CountTrue(d, hn::AndNot(finite, object));
+        return hn::CountTrue(d, hn::AndNot(finite, object));
     }
-    return not_finite;
-}
+};
 
-void accumulate_albedo(const LightSet& set, LeastSquaresBlock& block) {
-    const Floats d;
-    const Vector zero = hn::Zero(d);
-    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); i += lanes()) {
-        const Vector x = load(block.g[0], i), y = load(block.g[1], i), z = load(block.g[2], i);
-        Vector red = zero, green = zero, blue = zero, weight = zero, squared = zero;
-        for (std::size_t k = 0; k < set.lights.size(); ++k) {
-            const float* l = set.lights[k].direction.data();
-            const Plane* rgb = block.rgb(k);
-            const Vector shading = hn::Add(hn::Add(hn::Mul(x, hn::Set(d, l[0])), hn::Mul(y, hn::Set(d, l[1]))),
-                                           hn::Mul(z, hn::Set(d, l[2])));
-            const Vector lit = hn::Max(shading, zero);
-            const Vector error = hn::Sub(mean_sample(rgb, i), shading);
-            red = hn::Add(red, hn::Mul(load(rgb[0], i), lit));
-            green = hn::Add(green, hn::Mul(load(rgb[1], i), lit));
-            blue = hn::Add(blue, hn::Mul(load(rgb[2], i), lit));
-            weight = hn::Add(weight, hn::Mul(lit, lit));
-            squared = hn::Add(squared, hn::Mul(error, error));
-        }
+/// Sums over lights of what leads to albedo and residual.
+struct AlbedoSums {
+    Vector red, green, blue, weight, squared;
+
+    void add(const SolverLight& light, const Projection& g, const Colour& sample) {
+        const Floats d;
+        const float* l = light.direction.data();
+        const Vector shading = hn::Add(hn::Add(hn::Mul(g.x, hn::Set(d, l[0])), hn::Mul(g.y, hn::Set(d, l[1]))),
+                                       hn::Mul(g.z, hn::Set(d, l[2])));
+        const Vector lit = hn::Max(shading, hn::Zero(d));
+        const Vector error = hn::Sub(mean(sample), shading);
+        red = hn::Add(red, hn::Mul(sample.r, lit));
+        green = hn::Add(green, hn::Mul(sample.g, lit));
+        blue = hn::Add(blue, hn::Mul(sample.b, lit));
+        weight = hn::Add(weight, hn::Mul(lit, lit));
+        squared = hn::Add(squared, hn::Mul(error, error));
+    }
+
+    void put(std::size_t i, LeastSquaresBlock& block) const {
         store(red, block.colour[0], i);
         store(green, block.colour[1], i);
         store(blue, block.colour[2], i);
         store(weight, block.lit_weight, i);
         store(squared, block.squared, i);
+    }
+};
+
+std::size_t project(const LightSet& set, LeastSquaresBlock& block) {
+    const Vector zero = hn::Zero(Floats());
+    std::size_t not_finite = 0;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); i += lanes()) {
+        Projection g{zero, zero, zero};
+        for (std::size_t k = 0; k < set.lights.size(); ++k) g.add(set.lights[k], load_colour(block.rgb(k), i));
+        not_finite += g.put(i, block);
+    }
+    return not_finite;
+}
+
+void accumulate_albedo(const LightSet& set, LeastSquaresBlock& block) {
+    const Vector zero = hn::Zero(Floats());
+    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); i += lanes()) {
+        const Projection g{load(block.g[0], i), load(block.g[1], i), load(block.g[2], i)};
+        AlbedoSums sums{zero, zero, zero, zero, zero};
+        for (std::size_t k = 0; k < set.lights.size(); ++k) sums.add(set.lights[k], g, load_colour(block.rgb(k), i));
+        sums.put(i, block);
+    }
+}
+
+template <class Sample>
+std::optional<std::size_t> sum_plain(const PhotoBand& band, const LightSet& set, int row, int column,
+                                     LeastSquaresBlock& block) {
+    const Floats d;
+    const hn::Rebind<Sample, Floats> narrow;
+    const Vector zero = hn::Zero(d);
+    const auto count = static_cast<std::size_t>(block.count);
+    if (count % lanes() != 0) return std::nullopt;
+    float* kept = block.samples.get()->at.data();  // a few pixels' linear samples of all lights
+    std::size_t not_finite = 0;
+    for (std::size_t i = 0; i < count; i += lanes()) {
+        auto clipped = hn::MaskFromVec(zero);
+        Projection g{zero, zero, zero};
+        for (std::size_t k = 0; k < set.lights.size(); ++k) {
+            const SolverLight& light = set.lights[k];
+            const PhotoRows& rows = band.photos[light.image];
+            const Sample* samples = rows.samples.ptr<Sample>(row, column) + 3 * i;
+            // The photographs are more streams than the processor foresees.
+            for (std::size_t ahead = 0; ahead < 3 * lanes(); ahead += 64 / sizeof(Sample))
+                __builtin_prefetch(samples + 3 * block_pixels + ahead, 0, 3);
+            hn::Vec<decltype(narrow)> r, green, b;
+            hn::LoadInterleaved3(narrow, samples, r, green, b);
+            const Vector wide[3] = {widened(r), widened(green), widened(b)};
+            clipped = hn::Or(clipped, hn::Ge(hn::Max(hn::Max(wide[0], wide[1]), wide[2]), hn::Set(d, rows.limit)));
+            const Vector black = hn::Set(d, rows.black), scale = hn::Set(d, rows.scale);
+            const auto linear = [&](std::size_t c) {
+                return hn::Mul(hn::Mul(hn::Sub(wide[c], black), scale), hn::Set(d, light.gain[c]));
+            };
+            const Colour sample{linear(0), linear(1), linear(2)};
+            float* keep = kept + 3 * lanes() * k;
+            hn::Store(sample.r, d, keep);
+            hn::Store(sample.g, d, keep + lanes());
+            hn::Store(sample.b, d, keep + 2 * lanes());
+            g.add(light, sample);
+        }
+        if (!hn::AllFalse(d, clipped)) return std::nullopt;
+        not_finite += g.put(i, block);
+        AlbedoSums sums{zero, zero, zero, zero, zero};
+        for (std::size_t k = 0; k < set.lights.size(); ++k) {
+            const float* keep = kept + 3 * lanes() * k;
+            sums.add(set.lights[k], g,
+                     {hn::Load(d, keep), hn::Load(d, keep + lanes()), hn::Load(d, keep + 2 * lanes())});
+        }
+        sums.put(i, block);
+    }
+    return not_finite;
+}
+
+std::optional<std::size_t> sum_plain_samples(const PhotoBand& band, const LightSet& set, int row, int column,
+                                             LeastSquaresBlock& block) {
+    switch (band.photos[set.lights.front().image].samples.depth()) {
+        case CV_8U:
+            return sum_plain<std::uint8_t>(band, set, row, column, block);
+        case CV_16U:
+            return sum_plain<std::uint16_t>(band, set, row, column, block);
+        default:
+            return sum_plain<float>(band, set, row, column, block);
     }
 }
 
@@ -212,6 +301,7 @@ HWY_AFTER_NAMESPACE();
 namespace darkbox {
 
 HWY_EXPORT(load_photo);
+HWY_EXPORT(sum_plain_samples);
 HWY_EXPORT(project);
 HWY_EXPORT(accumulate_albedo);
 HWY_EXPORT(finish);
@@ -234,6 +324,17 @@ bool load_photo(const PhotoRows& rows, int row, int column, const std::array<flo
     if (rows.clipped.empty()) return at_limit;
     const uchar* clipped = rows.clipped[row] + column;
     return std::any_of(clipped, clipped + block.count, [](uchar c) { return c != 0; });
+}
+
+std::optional<std::size_t> sum_plain_samples(const PhotoBand& band, const LightSet& set, int row, int column,
+                                             LeastSquaresBlock& block) {
+    const int depth = band.photos[set.lights.front().image].samples.depth();
+    const bool plain = std::all_of(set.lights.begin(), set.lights.end(), [&](const SolverLight& light) {
+        const PhotoRows& rows = band.photos[light.image];
+        return rows.samples.depth() == depth && !rows.curve && rows.dark.empty() && rows.clipped.empty();
+    });
+    if (!plain) return std::nullopt;
+    return HWY_DYNAMIC_DISPATCH(sum_plain_samples)(band, set, row, column, block);
 }
 
 std::size_t project(const LightSet& set, LeastSquaresBlock& block) { return HWY_DYNAMIC_DISPATCH(project)(set, block); }

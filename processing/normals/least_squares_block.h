@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "processing/maps/photo_source.h"
 #include "processing/normals/light_set.h"
@@ -52,6 +53,13 @@ struct BlockResults {
 /// One light's samples: rows' pixels [column, column + block.count) of `row`. Returns whether any of them is clipped.
 bool load_photo(const PhotoRows& rows, int row, int column, const std::array<float, 3>& gain, std::size_t light,
                 LeastSquaresBlock& block);
+
+/// project() and accumulate_albedo() in one go for blocks as most are: linear samples without a dark frame, none of
+/// them clipped. Pixels pass through all lights while their samples are in the nearest cache; `samples` is left
+/// undefined. The same bits as by the other way. Returns what project() does, or no value where the block is of another
+/// kind: then load its photographs.
+std::optional<std::size_t> sum_plain_samples(const PhotoBand& band, const LightSet& set, int row, int column,
+                                             LeastSquaresBlock& block);
 
 /// g over all lights through the shared pseudo-inverse, and which pixels are usable: on the object, and without a
 /// sample that is not finite, which leaves its trace in g. Returns how many pixels of the object are not finite.

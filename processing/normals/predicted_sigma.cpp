@@ -1,9 +1,16 @@
 #include "processing/normals/predicted_sigma.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
+
 #include <Eigen/Dense>
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
+#include <functional>
 #include <numbers>
+#include <numeric>
 #include <vector>
 
 #include "processing/normals/pixel_sample.h"
@@ -93,15 +100,17 @@ LeastSquaresSigma::LeastSquaresSigma(const LightField& field, const NoiseModel& 
         mean_lamps_ += lamp / static_cast<float>(count);
     }
     inverse_moments_ = packed(moments.inverse());
+    lamps_known_ = !lamps_.isZero(0);
 }
 
 float LeastSquaresSigma::at(const Eigen::Vector3f& normal, float albedo, float variance, float used) const {
     const Eigen::Vector3f g = normal * albedo;
-    Symmetric pairs;
-    pairs << g.x() * g.x(), g.x() * g.y(), g.x() * g.z(), g.y() * g.y(), g.y() * g.z(), g.z() * g.z();
+    Symmetric pairs = Symmetric::Zero();
+    if (lamps_known_) pairs << g.x() * g.x(), g.x() * g.y(), g.x() * g.z(), g.y() * g.y(), g.y() * g.z(), g.z() * g.z();
     const float expected = std::max(mean_dark_ + mean_shot_.dot(g) + mean_lamps_.dot(pairs), 0.0F);
     const float beyond = excess(variance, expected, used - 3 + pooled_freedom);
-    const Symmetric covariance = dark_ + shot_ * g + lamps_ * pairs + beyond * inverse_moments_;
+    Symmetric covariance = dark_ + shot_ * g + beyond * inverse_moments_;
+    if (lamps_known_) covariance += lamps_ * pairs;
     return sigma_deg(covariance * (lights_ / used), normal, albedo);
 }
 
@@ -117,16 +126,51 @@ void LeastSquaresSigma::write_row(float picture_variance, int row, SolvedMaps& m
     }
 }
 
+namespace {
+
+/// Numbers that are not negative sort as their bits do: buckets of neighbouring ones by the upper half of those.
+using Counts = std::vector<std::size_t>;
+constexpr std::size_t buckets = 1 << 16;
+std::size_t bucket_of(float value) { return std::bit_cast<std::uint32_t>(value) >> 16; }
+
+/// Calls `take` with each variance of the row that tells something.
+template <class Take>
+void visit_variances(const SolvedMaps& maps, int row, Take take) {
+    for (int x = 0; x < maps.valid.cols; ++x)
+        if (const int used = maps.lights_used(row, x); maps.valid(row, x) && used > 3)
+            take(maps.residual(row, x) * maps.residual(row, x) * static_cast<float>(used) /
+                 static_cast<float>(used - 3));
+}
+
+Counts counts_by_bucket(const SolvedMaps& maps) {
+    return tbb::parallel_reduce(
+        tbb::blocked_range<int>(0, maps.valid.rows, 256), Counts(buckets, 0),
+        [&](const tbb::blocked_range<int>& rows, Counts counts) {
+            for (int row = rows.begin(); row < rows.end(); ++row)
+                visit_variances(maps, row, [&](float variance) { ++counts[bucket_of(variance)]; });
+            return counts;
+        },
+        [](Counts a, const Counts& b) {
+            std::transform(a.begin(), a.end(), b.begin(), a.begin(), std::plus<>());
+            return a;
+        });
+}
+
+}  // namespace
+
 float median_variance(const SolvedMaps& maps) {
-    std::vector<float> variances;
-    for (int y = 0; y < maps.valid.rows; ++y)
-        for (int x = 0; x < maps.valid.cols; ++x)
-            if (const int used = maps.lights_used(y, x); maps.valid(y, x) && used > 3)
-                variances.push_back(maps.residual(y, x) * maps.residual(y, x) * static_cast<float>(used) /
-                                    static_cast<float>(used - 3));
-    if (variances.empty()) return 0;
-    const auto middle = variances.begin() + static_cast<std::ptrdiff_t>(variances.size() / 2);
-    std::nth_element(variances.begin(), middle, variances.end());
+    const Counts counts = counts_by_bucket(maps);
+    std::size_t rank = std::accumulate(counts.begin(), counts.end(), std::size_t{0}) / 2, bucket = 0;
+    for (; bucket < buckets && rank >= counts[bucket]; ++bucket) rank -= counts[bucket];
+    if (bucket == buckets) return 0;
+    std::vector<float> near_median;
+    near_median.reserve(counts[bucket]);
+    for (int row = 0; row < maps.valid.rows; ++row)
+        visit_variances(maps, row, [&](float variance) {
+            if (bucket_of(variance) == bucket) near_median.push_back(variance);
+        });
+    const auto middle = near_median.begin() + static_cast<std::ptrdiff_t>(rank);
+    std::nth_element(near_median.begin(), middle, near_median.end());
     return *middle;
 }
 

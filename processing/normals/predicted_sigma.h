@@ -39,6 +39,7 @@ private:
     Symmetric dark_ = Symmetric::Zero();                                     ///< covariance of g for g = 0
     Eigen::Matrix<float, 6, 3> shot_ = Eigen::Matrix<float, 6, 3>::Zero();   ///< for each unit of g
     Eigen::Matrix<float, 6, 6> lamps_ = Eigen::Matrix<float, 6, 6>::Zero();  ///< for each unit of g's products
+    bool lamps_known_ = false;                                               ///< any of them is not zero
     float mean_dark_ = 0;  ///< variance of a sample, the same three parts
     Eigen::Vector3f mean_shot_ = Eigen::Vector3f::Zero();
     Symmetric mean_lamps_ = Symmetric::Zero();

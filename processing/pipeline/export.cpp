@@ -30,21 +30,42 @@ cv::Mat sixteen_bit(const cv::Mat3f& image) {
     return words;
 }
 
+/// All lit photographs in order, a few of them in memory at a time: `body(index, radiance)`.
+template <class Body>
+void for_each_photograph(const Session& session, const char* stage, const WorkContext& work, Body body) {
+    const std::vector<FrameRecord> frames = frames_of_kind(session, FrameKind::lit);
+    for (std::size_t first = 0; first < frames.size(); first += photographs_at_once) {
+        const std::size_t last = std::min(first + photographs_at_once, frames.size());
+        step(work, {stage, first, frames.size(), basename_of(frames[first])});
+        const std::vector<FrameRecord> some(frames.begin() + static_cast<std::ptrdiff_t>(first),
+                                            frames.begin() + static_cast<std::ptrdiff_t>(last));
+        const std::vector<Radiance> radiances = read_radiances(session, some, work);
+        for (std::size_t i = first; i < last; ++i) body(i, radiances[i - first]);
+    }
+}
+
+void require_light_for_each(const Session& session, const Lights& lights) {
+    const std::size_t frames = frames_of_kind(session, FrameKind::lit).size();
+    if (frames != lights.size())
+        throw InputError(
+            fmt::format("{} has {} lit frames but {} lights", session.folder().string(), frames, lights.size()),
+            "calibrate the session again");
+}
+
 /// DiLiGenT: 001.png..., and a line per photograph in each list. Lights that cannot be used are left out.
 void export_diligent(const Session& session, const fs::path& out, const WorkContext& work) {
     const Lights all = load_lights(session);
-    const PhotoStack stack = load_stack(session, work);
+    require_light_for_each(session, all);
+    write_png(out / "mask.png", load_mask(session, work));
     Lights lights;
     std::string names;
-    for (std::size_t i = 0; i < all.size(); ++i) {
-        if (!all[i].used) continue;
-        step(work, {"exporting", i, all.size(), stack.files[i]});
+    for_each_photograph(session, "exporting", work, [&](std::size_t i, const Radiance& photograph) {
+        if (!all[i].used) return;
         lights.push_back(all[i]);
         const std::string name = fmt::format("{:03}.png", lights.size());
-        write_png(out / name, sixteen_bit(stack.images[i]));
+        write_png(out / name, sixteen_bit(photograph.image));
         names += name + "\n";
-    }
-    write_png(out / "mask.png", stack.mask);
+    });
     write_light_directions(out / "light_directions.txt", lights);
     write_light_intensities(out / "light_intensities.txt", lights);
     write_file(out / "filenames.txt", names);
@@ -58,28 +79,17 @@ cv::Mat3f as_shown(const cv::Mat3f& linear) {
     return encoded;
 }
 
-/// Photographs are read a few at a time.
 Ptm fitted_ptm(const Session& session, const Lights& lights, PtmModel model, const WorkContext& work) {
-    const std::vector<FrameRecord> frames = frames_of_kind(session, FrameKind::lit);
-    if (frames.size() != lights.size())
-        throw InputError(
-            fmt::format("{} has {} lit frames but {} lights", session.folder().string(), frames.size(), lights.size()),
-            "calibrate the session again");
-    PtmFit fit({frames.front().width, frames.front().height}, model, lights);
-    for (std::size_t first = 0; first < frames.size(); first += photographs_at_once) {
-        const std::size_t last = std::min(first + photographs_at_once, frames.size());
-        step(work, {"fitting", first, frames.size(), basename_of(frames[first])});
-        const std::vector<FrameRecord> some(frames.begin() + static_cast<std::ptrdiff_t>(first),
-                                            frames.begin() + static_cast<std::ptrdiff_t>(last));
-        const std::vector<Radiance> radiances = read_radiances(session, some, work);
-        for (std::size_t i = first; i < last; ++i) {
-            const Eigen::Vector3d& e = lights[i].intensity;
-            if (!lights[i].used) continue;
-            cv::Mat3f relative;
-            cv::divide(radiances[i - first].image, cv::Scalar(e[0], e[1], e[2]), relative);
-            fit.add(as_shown(relative), i, work);
-        }
-    }
+    require_light_for_each(session, lights);
+    const FrameRecord like = frames_of_kind(session, FrameKind::lit).front();
+    PtmFit fit({like.width, like.height}, model, lights);
+    for_each_photograph(session, "fitting", work, [&](std::size_t i, const Radiance& photograph) {
+        const Eigen::Vector3d& e = lights[i].intensity;
+        if (!lights[i].used) return;
+        cv::Mat3f relative;
+        cv::divide(photograph.image, cv::Scalar(e[0], e[1], e[2]), relative);
+        fit.add(as_shown(relative), i, work);
+    });
     return fit.result();
 }
 

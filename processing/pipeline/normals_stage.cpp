@@ -1,3 +1,5 @@
+#include <tbb/parallel_invoke.h>
+
 #include <algorithm>
 
 #include "processing/formats/calibration_file.h"
@@ -6,6 +8,7 @@
 #include "processing/formats/map_files.h"
 #include "processing/formats/ply.h"
 #include "processing/formats/srgb.h"
+#include "processing/maps/parallel.h"
 #include "processing/normals/integrate.h"
 #include "processing/normals/solver_names.h"
 #include "processing/pipeline/angular_error.h"
@@ -73,16 +76,30 @@ PhotometricStereoResult solve_normals(SessionPhotos& photos, const Calibration& 
     return solved;
 }
 
+void write_confidence(const std::filesystem::path& path, const PhotometricStereoResult& solved) {
+    write_exr_rows(path, solved.residual.size(), {"lights_used", "residual", "sigma_deg"},
+                   [&](int row, float* samples) {
+                       for (int x = 0; x < solved.residual.cols; ++x) {
+                           *samples++ = static_cast<float>(solved.lights_used(row, x));
+                           *samples++ = solved.residual(row, x);
+                           *samples++ = solved.sigma_deg(row, x);
+                       }
+                   });
+}
+
+/// All files at a time: while one waits for the disk, another is encoded.
 void write_maps(const ResultFiles& files, const PhotometricStereoResult& solved, const WorkContext& work) {
     step(work, {"writing maps", 0, 1, files.results_folder.string()});
-    write_normal_map(files.normals, solved.normals);
-    write_normal_map(files.normals_png, solved.normals);
-    write_albedo_map(files.albedo, solved.albedo);
-    write_albedo_map(files.albedo_png, solved.albedo, viewing_gain(solved.albedo.albedo, solved.albedo.valid));
-    cv::Mat1f used;
-    solved.lights_used.convertTo(used, CV_32F);
-    write_exr(files.confidence,
-              {{"lights_used", used}, {"residual", solved.residual}, {"sigma_deg", solved.sigma_deg}});
+    on_threads_of(work, [&] {
+        tbb::parallel_invoke([&] { write_normal_map(files.normals, solved.normals); },
+                             [&] { write_normal_map(files.normals_png, solved.normals); },
+                             [&] { write_albedo_map(files.albedo, solved.albedo); },
+                             [&] {
+                                 const double gain = viewing_gain(solved.albedo.albedo, solved.albedo.valid);
+                                 write_albedo_map(files.albedo_png, solved.albedo, gain);
+                             },
+                             [&] { write_confidence(files.confidence, solved); });
+    });
 }
 
 }  // namespace

@@ -8,9 +8,11 @@
 #include "acquisition/frame/error.h"
 #include "processing/formats/calibration_file.h"
 #include "processing/formats/picture.h"
+#include "processing/maps/parallel.h"
 #include "processing/maps/require.h"
 #include "processing/pipeline/radiance.h"
 #include "processing/pipeline/session_files.h"
+#include "processing/pipeline/steps.h"
 
 namespace darkbox {
 namespace {
@@ -47,6 +49,19 @@ PhotoStack load_stack(const Session& session, const WorkContext& work) {
     stack.mask = mask ? read_mask(*mask) : automatic_mask(stack.images, balls_in_view(session));
     require_consistent(stack);
     return stack;
+}
+
+cv::Mat1b load_mask(const Session& session, const WorkContext& work) {
+    constexpr int rows_at_once = 64;
+    SessionPhotos photos(session);
+    if (extra_of(session, object_mask)) return photos.mask();
+    const int height = photos.size().height;
+    PhotoBand band;
+    for (int row = 0; row < height; row += rows_at_once) {
+        step(work, {"finding the object", static_cast<std::size_t>(row), static_cast<std::size_t>(height), ""});
+        on_threads_of(work, [&] { photos.read_next(std::min(rows_at_once, height - row), band); });
+    }
+    return photos.mask();
 }
 
 SessionPhotos::SessionPhotos(const Session& session) : session_(session) {

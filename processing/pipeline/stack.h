@@ -18,6 +18,8 @@ namespace darkbox {
 /// else found by automatic_mask(). Throws InputError for no lit frame, frames that cannot be read, or sizes that
 /// differ.
 PhotoStack load_stack(const Session& session, const WorkContext& work = {});
+/// The stack's mask alone: where it is not given, photographs are read for it, but few rows of them are held at a time.
+cv::Mat1b load_mask(const Session& session, const WorkContext& work = {});
 
 /// The same photographs for stages that work by bands of rows: nothing is held whole but what the mask needs, where it
 /// is not given. Refers to the session. Thread-compatible.

@@ -9,6 +9,7 @@
 #include "processing/formats/calibration_file.h"
 #include "processing/formats/environment_file.h"
 #include "processing/formats/exr.h"
+#include "processing/formats/png.h"
 #include "processing/formats/report/html.h"
 #include "processing/formats/report/report.h"
 #include "tests/support/test_data.h"
@@ -83,6 +84,31 @@ TEST_F(Files, AFileThatIsNoCalibrationIsNamed) {
                 HasSubstr("lights.json is not a calibration"));
     write_file(at("lights.json"), "{");
     EXPECT_THAT(input_error_of([&] { read_calibration(at("lights.json")); }), HasSubstr("lights.json is not JSON"));
+}
+
+TEST_F(Files, PngKeepsEverySampleOfEveryType) {
+    for (const int type : {CV_8UC1, CV_8UC3, CV_16UC1, CV_16UC3}) {
+        cv::Mat image(37, 53, type);
+        cv::randu(image, cv::Scalar::all(0), cv::Scalar::all(65536));
+        write_png(at("a.png"), image);
+        const cv::Mat read = read_png(at("a.png"));
+        ASSERT_EQ(read.type(), type);
+        EXPECT_EQ(cv::norm(read, image, cv::NORM_INF), 0);
+        EXPECT_EQ(read_file(at("a.png")), encode_png(image));
+    }
+    EXPECT_THAT(input_error_of([&] { write_png(at("none.png"), cv::Mat(2, 2, CV_32F)); }),
+                HasSubstr("cannot encode a picture of 2x2 pixels"));
+    EXPECT_FALSE(fs::exists(at("none.png")));
+}
+
+TEST_F(Files, ExrKeepsEveryBitOfEveryChannel) {
+    cv::Mat1f noise(37, 53), same(37, 53, 0.1F);
+    cv::randu(noise, -3, 1e9);
+    write_exr(at("a.exr"), {{"z", noise}, {"a", same}});
+    EXPECT_EQ(cv::norm(read_exr_channel(at("a.exr"), "z"), noise, cv::NORM_INF), 0);
+    EXPECT_EQ(cv::norm(read_exr_channel(at("a.exr"), "a"), same, cv::NORM_INF), 0);
+    EXPECT_THAT(input_error_of([&] { write_exr(at("none.exr"), cv::Mat3f()); }), HasSubstr("no pixels"));
+    EXPECT_FALSE(fs::exists(at("none.exr")));
 }
 
 TEST_F(Files, EnvironmentsAreCheckedForShapeAndNumbers) {
