@@ -111,8 +111,8 @@ void print_tables() {
             simulated(fmt::format("{}-{}", shape, material), 24);
     fmt::print("\nmaterials and shapes that no setting was chosen on\n");
     for (const char* shape : {"sphere", "torus", "relief", "teapot"})
-        for (const char* material : {"marble-ggx15", "speckle-ggx30", "moss-ggx50", "lambert-cloth15", "stone-cloth30",
-                                     "speckle-cloth50", "marble-phong40n60"})
+        for (const char* material : {"marble-ggx15", "brick-ggx30", "speckle-ggx30", "moss-ggx50", "lambert-cloth15",
+                                     "stone-cloth30", "speckle-cloth50", "marble-phong40n60"})
             simulated(fmt::format("{}-{}", shape, material), 24);
     for (const int lamps : {9, 12, 48}) simulated("torus-speckle-ggx30", lamps);
 }
