@@ -20,6 +20,7 @@ constexpr float kept_deviations = 3.0F;   ///< the last fit: full weight within,
 constexpr float lost_deviations = 6.0F;   ///< none beyond
 constexpr float above_strictness = 1.5F;  ///< gloss lies above the fit only: such residuals count as this much larger
 constexpr float smallest_scale = 0.002F;  ///< of |g|: no material follows a law more closely
+constexpr float least_facing = -0.1F;     ///< between normal and view: what is seen does not face further away
 constexpr float gloss_doubt = 0.2F;       ///< of a sample's gloss: real lobes are not quite Phong's
 constexpr float deviation_per_median = 1.4826F;
 constexpr float worst_reciprocal_condition = 1e-4F;  ///< of the moments of the lights kept
@@ -265,6 +266,7 @@ std::optional<PixelFit> PixelSolver::solve(const BodyFactor& factor, const Gloss
         g = *better;
     }
     if (!(g.norm() > 0)) return std::nullopt;
+    if (g.dot(samples.view) < least_facing * g.norm()) return solve_least_squares();
     return finish(g, square(scale_));
 }
 

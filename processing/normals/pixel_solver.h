@@ -45,6 +45,7 @@ struct PixelFit {
 ///    strictly.
 /// 4. Last, least squares over what lies within a few deviations, weighted by noise: where every sample agrees this is
 ///    the efficient estimate.
+/// A fit that faces away from the camera is not what the camera sees: least squares over all stands in for it.
 /// With fewer than seven lit samples only steps 3 and 4 are left, from least squares over all.
 class PixelSolver {
 public:
