@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <stdexcept>
 #include <variant>
 
@@ -69,6 +70,27 @@ RTCRay embree_ray(const Ray& ray, double far_mm) {
 
 Vec3 facing(const Vec3& normal, const Vec3& direction) { return dot(normal, direction) > 0.0 ? -normal : normal; }
 
+/// Tiles around a sphere's equator, and from pole to pole; the poles lie along y.
+constexpr int sphere_tiles_around = 24;
+constexpr int sphere_tiles_up = 24;
+
+/// Longitude and latitude in tiles. At the poles the derivative along the parallel is zero.
+SurfacePoint point_on_sphere(const Sphere& sphere, const Vec3& position, const Vec3& outward) {
+    constexpr double pi = std::numbers::pi;
+    SurfacePoint point;
+    point.position = position;
+    const double from_axis = std::hypot(outward.x, outward.z);
+    point.uv = {(std::atan2(outward.x, outward.z) / (2.0 * pi) + 0.5) * sphere_tiles_around,
+                (std::atan2(outward.y, from_axis) / pi + 0.5) * sphere_tiles_up};
+    point.period_u = sphere_tiles_around;
+    if (from_axis > 0.0) {
+        const Vec3 east{outward.z / from_axis, 0.0, -outward.x / from_axis};
+        point.position_du = east * (2.0 * pi * sphere.radius_mm * from_axis / sphere_tiles_around);
+        point.position_dv = cross(outward, east) * (pi * sphere.radius_mm / sphere_tiles_up);
+    }
+    return point;
+}
+
 /// The hit again in double precision: Embree's floats only tell that there is one.
 RayHit on_sphere(const Sphere& sphere, const Ray& ray, double rough_distance) {
     const Vec3 to_centre = sphere.centre - ray.origin;
@@ -77,8 +99,10 @@ RayHit on_sphere(const Sphere& sphere, const Ray& ray, double rough_distance) {
     const double half_chord = std::sqrt(std::max(0.0, sphere.radius_mm * sphere.radius_mm - dot(off_axis, off_axis)));
     RayHit hit;
     hit.distance_mm = rough_distance < middle ? middle - half_chord : middle + half_chord;
-    hit.point.position = ray.origin + ray.direction * hit.distance_mm;
-    hit.normal = facing(unit(hit.point.position - sphere.centre), ray.direction);
+    const Vec3 position = ray.origin + ray.direction * hit.distance_mm;
+    const Vec3 outward = unit(position - sphere.centre);
+    hit.point = point_on_sphere(sphere, position, outward);
+    hit.normal = facing(outward, ray.direction);
     hit.geometric_normal = hit.normal;
     return hit;
 }

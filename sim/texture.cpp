@@ -139,7 +139,8 @@ Vec2 uv_step(const SurfacePoint& point, const Vec3& step) {
     const double uv = dot(point.position_du, point.position_dv);
     const double vv = dot(point.position_dv, point.position_dv);
     const double determinant = uu * vv - uv * uv;
-    if (determinant < 1e-6 * (uu + vv) * (uu + vv)) return {};
+    // Written so that a surface without parameters, where both sides are zero, ends here as well.
+    if (!(determinant > 1e-6 * (uu + vv) * (uu + vv))) return {};
     const double su = dot(step, point.position_du);
     const double sv = dot(step, point.position_dv);
     return {(vv * su - uv * sv) / determinant, (uu * sv - uv * su) / determinant};

@@ -47,7 +47,8 @@ private:
         if (!field_.uniform() || arrivals_.empty()) field_.arrivals(row, column, arrivals_);
         samples_.fill(field_, arrivals_, model_.noise, column, solver_.samples);
         solver_.samples.view = field_.to_camera(row, column);
-        const auto fit = method_ == PixelMethod::robust ? solver_.solve(factor_) : solver_.solve_least_squares();
+        const auto fit =
+            method_ == PixelMethod::robust ? solver_.solve(factor_, model_.gloss) : solver_.solve_least_squares();
         if (!fit) return;
         const cv::Vec3f albedo = albedo_at(column);
         if (!((albedo[0] + albedo[1] + albedo[2]) / 3.0F >= min_albedo_)) return;
@@ -65,7 +66,8 @@ private:
         for (std::size_t k = 0; k < arrivals_.size(); ++k) {
             const float shading = std::max(solver_.cosine(k), 0.0F) * solver_.factors()[k];
             const float weight = solver_.weights()[k] * shading;
-            colour += samples_.colour(k, column) * (weight / arrivals_[k].falloff);
+            const cv::Vec3f gloss = cv::Vec3f::all(solver_.gloss(k));
+            colour += (samples_.colour(k, column) * (1.0F / arrivals_[k].falloff) - gloss) * weight;
             total += weight * shading;
         }
         return total > 0 ? cv::Vec3f(colour * (1.0F / total)) : cv::Vec3f::all(0);

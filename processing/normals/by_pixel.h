@@ -4,15 +4,17 @@
 
 #include "processing/maps/photo_source.h"
 #include "processing/normals/body_law.h"
+#include "processing/normals/gloss_law.h"
 #include "processing/normals/least_squares.h"
 #include "processing/normals/light_field.h"
 #include "processing/normals/noise_model.h"
 
 namespace darkbox {
 
-/// What one law of the body and the sensor's noise say about samples; the same for the whole picture.
+/// What the laws of the body and of its gloss and the sensor's noise say about samples; the same for the whole picture.
 struct SampleModel {
     BodyLaw law;
+    GlossLaw gloss;
     NoiseModel noise;
 };
 

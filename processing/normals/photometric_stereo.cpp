@@ -126,7 +126,7 @@ void sum_up(const SolvedMaps& maps, PhotometricStereoResult& result) {
 
 SampleModel model_for(PhotoSource& photos, const LightField& field, const PhotometricStereoOptions& options,
                       int band_rows, const WorkContext& work) {
-    if (options.solver == Solver::lsq) return {BodyLaw{}, options.model.noise.value_or(NoiseModel{})};
+    if (options.solver == Solver::lsq) return {BodyLaw{}, GlossLaw{}, options.model.noise.value_or(NoiseModel{})};
     const SampleModel model = find_sample_model(photos, field, options.model, band_rows, work);
     stop_if_wished(work);
     return model;

@@ -20,6 +20,8 @@ constexpr float kept_deviations = 3.0F;   ///< the last fit: full weight within,
 constexpr float lost_deviations = 6.0F;   ///< none beyond
 constexpr float above_strictness = 1.5F;  ///< gloss lies above the fit only: such residuals count as this much larger
 constexpr float smallest_scale = 0.002F;  ///< of |g|: no material follows a law more closely
+constexpr float least_facing = -0.1F;     ///< between normal and view: what is seen does not face further away
+constexpr float gloss_doubt = 0.2F;       ///< of a sample's gloss: real lobes are not quite Phong's
 constexpr float deviation_per_median = 1.4826F;
 constexpr float worst_reciprocal_condition = 1e-4F;  ///< of the moments of the lights kept
 constexpr int reweighted_rounds = 8;
@@ -45,6 +47,9 @@ void PixelSolver::prepare() {
     factor_.assign(n, 1.0F);
     residual_.assign(n, 0.0F);
     cosine_.assign(n, 0.0F);
+    gloss_.assign(n, 0.0F);
+    row_.resize(n);
+    forget_law();
     lit_.assign(n, 0);
     order_.clear();
     scratch_.clear();
@@ -68,31 +73,58 @@ void PixelSolver::prepare() {
     });
 }
 
-void PixelSolver::predict(const Eigen::Vector3f& g, const BodyFactor& factor) {
+void PixelSolver::forget_law() {
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+        factor_[i] = 1.0F;
+        gloss_[i] = 0.0F;
+        row_[i] = {samples.x[i], samples.y[i], samples.z[i]};
+    }
+}
+
+void PixelSolver::predict(const Eigen::Vector3f& g) {
     const float length = g.norm();
     const float per_length = length > 0 ? 1.0F / length : 0.0F;
     const Eigen::Vector3f& v = samples.view;
     const float to_view = g.dot(v) * per_length;
     for (std::size_t i = 0; i < samples.size(); ++i) {
-        const float shading = g.x() * samples.x[i] + g.y() * samples.y[i] + g.z() * samples.z[i];
+        const Eigen::Vector3f light(samples.x[i], samples.y[i], samples.z[i]);
+        const float shading = g.dot(light);
         cosine_[i] = shading * per_length;
-        if (!factor.constant())
-            factor_[i] =
-                factor(cosine_[i], to_view, v.x() * samples.x[i] + v.y() * samples.y[i] + v.z() * samples.z[i]);
+        if (!factor_of_law_->constant()) {
+            factor_[i] = (*factor_of_law_)(cosine_[i], to_view, v.dot(light));
+            row_[i] = factor_[i] * light;
+        }
         residual_[i] = samples.value[i] - std::max(shading, 0.0F) * factor_[i];
+    }
+    if (gloss_law_.present() && length > 0) predict_gloss(g);
+}
+
+/// The lobe is linearised about this normal; it does not depend on the length of g.
+void PixelSolver::predict_gloss(const Eigen::Vector3f& g) {
+    const float length = g.norm();
+    const Eigen::Vector3f normal = g / length;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+        const Eigen::Vector3f light(samples.x[i], samples.y[i], samples.z[i]);
+        const GlossAt gloss = gloss_at(gloss_law_, normal, light, samples.view);
+        gloss_[i] = gloss.value;
+        row_[i] = factor_[i] * light + (gloss.slope - normal * normal.dot(gloss.slope)) / length;
+        residual_[i] -= gloss.value;
     }
 }
 
-/// Weighted least squares of value against f (g.l), f held as it is.
+/// How far the gloss of a sample may be off, squared.
+float PixelSolver::doubt_squared(std::size_t i) const { return square(gloss_doubt * gloss_[i]); }
+
+/// Weighted least squares of value less gloss against f (g.l), f held as it is: a step of Gauss and Newton where
+/// there is gloss.
 std::optional<Eigen::Vector3f> PixelSolver::weighted_fit() const {
     std::array<double, 6> m{};
     std::array<double, 3> b{};
     for (std::size_t i = 0; i < samples.size(); ++i) {
         if (!(weight_[i] > 0)) continue;
-        const double x = samples.x[i], y = samples.y[i], z = samples.z[i];
-        const double wf = static_cast<double>(weight_[i]) * static_cast<double>(factor_[i]);
-        const double w = wf * static_cast<double>(factor_[i]);
-        const double v = wf * static_cast<double>(samples.value[i]);
+        const double x = row_[i].x(), y = row_[i].y(), z = row_[i].z();
+        const double w = weight_[i];
+        const double v = w * static_cast<double>(samples.value[i] - gloss_[i]);
         m[0] += w * x * x;
         m[1] += w * x * y;
         m[2] += w * x * z;
@@ -124,8 +156,8 @@ std::optional<Eigen::Vector3f> PixelSolver::band_fit(float low, float high) {
 }
 
 /// One concentration step: least squares over the better half of the lit samples; false where that fails.
-bool PixelSolver::concentrate(Eigen::Vector3f& g, const BodyFactor& factor) {
-    predict(g, factor);
+bool PixelSolver::concentrate(Eigen::Vector3f& g) {
+    predict(g);
     scratch_.clear();
     for (const std::size_t i : order_) scratch_.push_back(std::abs(residual_[i]));
     const auto kept = static_cast<std::ptrdiff_t>((order_.size() + 4) / 2);
@@ -148,38 +180,45 @@ float PixelSolver::median_residual(float smallest_cosine) {
     return *middle;
 }
 
-std::optional<Eigen::Vector3f> PixelSolver::best_start(const BodyFactor& factor) {
+std::optional<Eigen::Vector3f> PixelSolver::best_start() {
     if (order_.size() < enough_to_trim) return band_fit(0.0F, 1.0F);
     std::optional<Eigen::Vector3f> best;
     float smallest = std::numeric_limits<float>::infinity();
     for (const Band& band : bands) {
-        std::fill(factor_.begin(), factor_.end(), 1.0F);
+        forget_law();
         auto g = band_fit(band.low, band.high);
-        if (!g || !concentrate(*g, factor) || !concentrate(*g, factor)) continue;
-        predict(*g, factor);
+        if (!g || !concentrate(*g) || !concentrate(*g)) continue;
+        predict(*g);
         const float median = median_residual(-1.0F);
         if (median < smallest) {
             smallest = median;
             best = g;
         }
     }
-    return best ? best : band_fit(0.0F, 1.0F);
+    if (best) return best;
+    forget_law();
+    return band_fit(0.0F, 1.0F);
 }
 
-float PixelSolver::misfit(float scale) const {
+std::vector<float> PixelSolver::lit_residuals() const {
+    std::vector<float> residuals;
+    for (const std::size_t i : order_)
+        if (cosine_[i] > terminator_cosine) residuals.push_back(residual_[i]);
+    return residuals;
+}
+
+float misfit(const std::vector<float>& residuals, float scale) {
+    if (residuals.empty()) return 1.0F;
     double loss = 0;
-    int count = 0;
-    for (const std::size_t i : order_) {
-        if (!(cosine_[i] > terminator_cosine)) continue;
-        const float t = square(residual_[i] / (loss_deviations * scale));
+    for (const float residual : residuals) {
+        const float t = square(residual / (loss_deviations * scale));
         loss += static_cast<double>(t / (1.0F + t));
-        ++count;
     }
-    return count > 0 ? static_cast<float>(loss / count) : 1.0F;
+    return static_cast<float>(loss / static_cast<double>(residuals.size()));
 }
 
-PixelFit PixelSolver::finish(const Eigen::Vector3f& g, const BodyFactor& factor, float variance) {
-    predict(g, factor);
+PixelFit PixelSolver::finish(const Eigen::Vector3f& g, float variance) {
+    predict(g);
     PixelFit fit{g, variance, 0};
     double squares = 0, total = 0;
     for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -193,14 +232,16 @@ PixelFit PixelSolver::finish(const Eigen::Vector3f& g, const BodyFactor& factor,
     return fit;
 }
 
-std::optional<PixelFit> PixelSolver::solve(const BodyFactor& factor) {
+std::optional<PixelFit> PixelSolver::solve(const BodyFactor& factor, const GlossLaw& gloss) {
     prepare();
-    auto start = best_start(factor);
+    factor_of_law_ = &factor;
+    gloss_law_ = gloss;
+    auto start = best_start();
     if (!start) return solve_least_squares();
     Eigen::Vector3f g = *start;
     scale_ = 0;
     for (int round = 0; round < reweighted_rounds + 2; ++round) {
-        predict(g, factor);
+        predict(g);
         const float median = median_residual(terminator_cosine);
         if (!std::isfinite(median)) break;
         const auto n = static_cast<float>(scratch_.size());
@@ -210,12 +251,14 @@ std::optional<PixelFit> PixelSolver::solve(const BodyFactor& factor) {
         for (std::size_t i = 0; i < samples.size(); ++i) {
             weight_[i] = 0;
             if (!lit_[i] || !(cosine_[i] > terminator_cosine)) continue;
-            const float t = std::abs(residual_[i]) * (residual_[i] > 0 ? above_strictness : 1.0F) / scale_;
+            const float doubt = doubt_squared(i), spread_squared = square(scale_) + doubt;
+            const float strictness = residual_[i] > 0 ? above_strictness : 1.0F;
+            const float t = std::abs(residual_[i]) * strictness / std::sqrt(spread_squared);
             if (last) {
                 const float taper = std::clamp((lost_deviations - t) / (lost_deviations - kept_deviations), 0.0F, 1.0F);
-                weight_[i] = taper * square(scale_) / (square(scale_) - mean_noise_ + samples.noise_variance[i]);
+                weight_[i] = taper * square(scale_) / (spread_squared - mean_noise_ + samples.noise_variance[i]);
             } else {
-                weight_[i] = 1.0F / square(1.0F + square(t / loss_deviations));
+                weight_[i] = square(scale_) / (spread_squared * square(1.0F + square(t / loss_deviations)));
             }
         }
         const auto better = weighted_fit();
@@ -223,12 +266,15 @@ std::optional<PixelFit> PixelSolver::solve(const BodyFactor& factor) {
         g = *better;
     }
     if (!(g.norm() > 0)) return std::nullopt;
-    return finish(g, factor, square(scale_));
+    if (g.dot(samples.view) < least_facing * g.norm()) return solve_least_squares();
+    return finish(g, square(scale_));
 }
 
 std::optional<PixelFit> PixelSolver::solve_least_squares() {
     static const BodyFactor lambert{BodyLaw{}};
     prepare();
+    factor_of_law_ = &lambert;
+    gloss_law_ = {};
     for (std::size_t i = 0; i < samples.size(); ++i) weight_[i] = samples.usable[i] ? 1.0F : 0.0F;
     auto g = weighted_fit();
     if (!g) {
@@ -236,7 +282,7 @@ std::optional<PixelFit> PixelSolver::solve_least_squares() {
         g = weighted_fit();
     }
     if (!g || !(g->norm() > 0)) return std::nullopt;
-    return finish(*g, lambert, mean_noise_);
+    return finish(*g, mean_noise_);
 }
 
 }  // namespace darkbox

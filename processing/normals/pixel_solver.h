@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "processing/normals/body_law.h"
+#include "processing/normals/gloss_law.h"
 
 namespace darkbox {
 
@@ -30,8 +31,10 @@ struct PixelFit {
 /// Fits g = albedo times normal to one pixel's samples and says how much each of them counts. Owns buffers that it
 /// uses again for each pixel: one solver per thread. Thread-compatible.
 ///
-/// The model of a sample: value = (g.l) f + noise, f the body's factor. Some samples do not follow it: shadows,
-/// attached or cast, lie below; highlights lie above.
+/// The model of a sample: value = (g.l) f + gloss + noise, f the body's factor; gloss, where its law is known, depends
+/// on the normal, and each fit is a step of Gauss and Newton. Gloss is trusted to a fifth of itself: samples deep in a
+/// highlight count little, those at its foot are corrected. Some samples do not follow the model: shadows, attached or
+/// cast, lie below; highlights that the law does not know lie above.
 /// 1. Samples that are dark against the pixel's upper quartile are shadows.
 /// 2. Starts: least squares over several bands of the sorted lit samples (position thresholds after Shi, Tan,
 /// Matsushita
@@ -42,13 +45,14 @@ struct PixelFit {
 ///    strictly.
 /// 4. Last, least squares over what lies within a few deviations, weighted by noise: where every sample agrees this is
 ///    the efficient estimate.
+/// A fit that faces away from the camera is not what the camera sees: least squares over all stands in for it.
 /// With fewer than seven lit samples only steps 3 and 4 are left, from least squares over all.
 class PixelSolver {
 public:
     PixelSamples samples;
 
     /// None where the samples do not determine a normal.
-    std::optional<PixelFit> solve(const BodyFactor& factor);
+    std::optional<PixelFit> solve(const BodyFactor& factor, const GlossLaw& gloss = {});
     /// Plain least squares over all usable samples with Lambert's law; all samples where the usable ones do not
     /// determine g.
     std::optional<PixelFit> solve_least_squares();
@@ -59,27 +63,39 @@ public:
     /// After a solve: value less the fit.
     float residual(std::size_t i) const { return residual_[i]; }
     float cosine(std::size_t i) const { return cosine_[i]; }
-    /// After solve(): how badly the lit samples fit, 0 to 1: the mean of Geman and McClure's loss for this scale.
-    float misfit(float scale) const;
+    float gloss(std::size_t i) const { return gloss_[i]; }  ///< that the fit says is in the sample
+    /// The derivative of the sample's fit along g.
+    const Eigen::Vector3f& derivative(std::size_t i) const { return row_[i]; }
+    /// After solve(): the residuals of the lit samples away from the attached shadow's edge.
+    std::vector<float> lit_residuals() const;
     /// After solve(): the robust standard deviation that the last reweighting used.
     float scale() const { return scale_; }
 
 private:
     void prepare();
-    void predict(const Eigen::Vector3f& g, const BodyFactor& factor);
+    void forget_law();
+    void predict(const Eigen::Vector3f& g);
+    void predict_gloss(const Eigen::Vector3f& g);
     std::optional<Eigen::Vector3f> weighted_fit() const;
-    std::optional<Eigen::Vector3f> best_start(const BodyFactor& factor);
+    std::optional<Eigen::Vector3f> best_start();
     std::optional<Eigen::Vector3f> band_fit(float low, float high);
-    bool concentrate(Eigen::Vector3f& g, const BodyFactor& factor);
+    bool concentrate(Eigen::Vector3f& g);
     float median_residual(float smallest_cosine);
-    PixelFit finish(const Eigen::Vector3f& g, const BodyFactor& factor, float variance);
+    float doubt_squared(std::size_t i) const;
+    PixelFit finish(const Eigen::Vector3f& g, float variance);
 
-    std::vector<float> weight_, factor_, residual_, cosine_;
+    const BodyFactor* factor_of_law_ = nullptr;  ///< of the solve() that runs
+    GlossLaw gloss_law_;
+    std::vector<float> weight_, factor_, residual_, cosine_, gloss_;
+    std::vector<Eigen::Vector3f> row_;  ///< derivative of a sample along g
     std::vector<char> lit_;
     std::vector<std::size_t> order_;  ///< of the lit samples, darkest first
     std::vector<float> scratch_;
     float mean_noise_ = 0;
     float scale_ = 0;
 };
+
+/// The mean of Geman and McClure's loss of residuals for this scale, 0 to 1; 1 where there is none.
+float misfit(const std::vector<float>& residuals, float scale);
 
 }  // namespace darkbox

@@ -67,11 +67,11 @@ float predicted_sigma_deg(const PixelFit& fit, const PixelSolver& solver, const 
     const float beyond = excess(fit.variance, expected / total, static_cast<float>(fit.used - 3));
     Eigen::Matrix3d moments = Eigen::Matrix3d::Zero(), spread = Eigen::Matrix3d::Zero();
     for (std::size_t k = 0; k < samples.size(); ++k) {
-        const auto weight = static_cast<double>(solver.weights()[k]), factor = static_cast<double>(solver.factors()[k]);
+        const auto weight = static_cast<double>(solver.weights()[k]);
         const auto variance = static_cast<double>(samples.noise_variance[k] + lamp_variance(k) + beyond);
-        const Eigen::Vector3d l = factor * Eigen::Vector3f(samples.x[k], samples.y[k], samples.z[k]).cast<double>();
-        moments += weight * l * l.transpose();
-        spread += weight * weight * variance * l * l.transpose();
+        const Eigen::Vector3d along = solver.derivative(k).cast<double>();
+        moments += weight * along * along.transpose();
+        spread += weight * weight * variance * along * along.transpose();
     }
     const Eigen::Matrix3d inverse = moments.inverse();
     return sigma_deg(packed(inverse * spread * inverse), fit.g.normalized(), fit.g.norm());

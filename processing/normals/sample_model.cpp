@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "processing/normals/law_search.h"
 #include "processing/normals/pixel_sample.h"
 #include "processing/normals/pixel_solver.h"
 
@@ -15,10 +16,9 @@ namespace darkbox {
 namespace {
 
 constexpr double pairs_wanted = 12000;  ///< over the whole picture, most of them beside the object
-constexpr std::size_t most_pairs_of_law = 1500;
+constexpr std::size_t most_pixels_of_law = 1000;
 constexpr std::size_t classes = 8;
 constexpr std::size_t least_lights_of_law = 7;
-constexpr float better_than_lambert = 0.97F;
 constexpr double deviation_per_median = 1.4826;
 
 /// Two pixels side by side, before any noise is known.
@@ -165,58 +165,30 @@ NoiseModel find_noise(std::vector<Pair>& pairs, const LightField& field) {
     return noise_of_differences(pairs, field);
 }
 
-/// Each law's misfit at one pixel relative to Lambert's, all judged on the scale of the best; empty where one fails.
-std::vector<float> relative_misfits(const PixelSamples& pixel, const std::vector<BodyFactor>& factors) {
-    PixelSolver solver;
-    solver.samples = pixel;
-    float scale = std::numeric_limits<float>::infinity();
-    for (const BodyFactor& factor : factors)
-        if (solver.solve(factor)) scale = std::min(scale, solver.scale());
-    std::vector<float> misfits;
-    for (const BodyFactor& factor : factors) {
-        if (!solver.solve(factor)) return {};
-        misfits.push_back(solver.misfit(scale));
+/// Pixels spread over the grid, with their noise.
+std::vector<PixelSamples> pixels_of_law(std::vector<Pair>& pairs, const NoiseModel& noise, const LightField& field) {
+    std::vector<PixelSamples> pixels;
+    const std::size_t step = (pairs.size() + most_pixels_of_law - 1) / most_pixels_of_law;
+    for (std::size_t i = 0; i < pairs.size(); i += step) {
+        pixels.push_back(pairs[i].pixels[0]);
+        put_noise(noise, field, pixels.back());
     }
-    const float lambert = misfits.front();
-    if (!(lambert > 0)) return {};
-    for (float& misfit : misfits) misfit /= lambert;
-    return misfits;
-}
-
-BodyLaw find_law(std::vector<Pair>& pairs, const NoiseModel& noise, const LightField& field) {
-    if (field.size() < least_lights_of_law || pairs.empty()) return {};
-    std::vector<BodyFactor> factors;
-    for (const BodyLaw& law : body_laws()) factors.emplace_back(law);
-    const std::size_t step = (pairs.size() + most_pairs_of_law - 1) / most_pairs_of_law;
-    std::vector<std::vector<float>> misfits((pairs.size() + step - 1) / step);
-    tbb::parallel_for(std::size_t{0}, misfits.size(), [&](std::size_t i) {
-        PixelSamples& pixel = pairs[i * step].pixels[0];
-        put_noise(noise, field, pixel);
-        misfits[i] = relative_misfits(pixel, factors);
-    });
-    std::size_t best = 0;
-    float smallest = better_than_lambert;
-    for (std::size_t law = 1; law < factors.size(); ++law) {
-        std::vector<float> of_law;
-        for (const auto& at_pixel : misfits)
-            if (!at_pixel.empty()) of_law.push_back(at_pixel[law]);
-        if (of_law.empty()) return {};
-        const auto middle = of_law.begin() + static_cast<std::ptrdiff_t>(of_law.size() / 2);
-        std::nth_element(of_law.begin(), middle, of_law.end());
-        if (*middle < smallest) smallest = *middle, best = law;
-    }
-    return body_laws()[best];
+    return pixels;
 }
 
 }  // namespace
 
 SampleModel find_sample_model(PhotoSource& photos, const LightField& field, const GivenModel& given, int band_rows,
                               const WorkContext& work) {
-    SampleModel model{given.law.value_or(BodyLaw{}), given.noise.value_or(NoiseModel{})};
+    SampleModel model{given.law.value_or(BodyLaw{}), {}, given.noise.value_or(NoiseModel{})};
     if (given.law && given.noise) return model;
     std::vector<Pair> pairs = read_pairs(photos, field, band_rows, work);
     if (!given.noise) model.noise = find_noise(pairs, field);
-    if (!given.law) model.law = find_law(pairs, model.noise, field);
+    if (!given.law && field.size() >= least_lights_of_law) {
+        const SurfaceLaw found = find_surface_law(pixels_of_law(pairs, model.noise, field));
+        model.law = found.body;
+        model.gloss = found.gloss;
+    }
     return model;
 }
 

@@ -24,8 +24,8 @@ struct GivenModel {
 /// classes gives read noise and shot gain. Cameras whose neighbouring samples share noise (after demosaicing) look
 /// better than they are.
 ///
-/// Law: the one whose fits leave the smallest misfit in the median over pixels, each relative to Lambert's. It must
-/// beat Lambert's law by 3 %, and there must be at least seven lights; else Lambert's law is kept.
+/// Laws of body and gloss: find_surface_law() on at most a thousand of these pixels. With fewer than seven lights
+/// Lambert's law without gloss is kept; a given body law comes without gloss.
 SampleModel find_sample_model(PhotoSource& photos, const LightField& field, const GivenModel& given, int band_rows,
                               const WorkContext& work);
 

@@ -131,6 +131,7 @@ NormalsSummary run_normals(const Session& session, const NormalsOptions& options
     summary.seconds.read = std::max(0.0, watch.lap() - solved.seconds);
     summary.solver = name(options.stereo.solver);
     summary.body = solved.model.law.name();
+    summary.gloss = solved.model.gloss.name();
     summary.images = static_cast<std::size_t>(direction_matrix(lights).rows());
     summary.pixels = solved.pixels;
     summary.residual_rms = solved.residual_rms;

@@ -65,6 +65,7 @@ struct HeightFacts {
 struct NormalsSummary {
     std::string solver;                                           ///< lsq or robust
     std::string body;                                             ///< the law of the material's body that was used
+    std::string gloss;                                            ///< the law of its gloss; "none" where none was found
     IntensityOrigin intensity_origin = IntensityOrigin::unknown;  ///< of the lights that were used
     Lights lights;                                                ///< the lights that were used
     std::size_t images = 0;

@@ -77,6 +77,7 @@ ordered_json to_json(const NormalsSummary& summary) {
         intensities.push_back({{"file", light.file}, {"intensity", triple(light.intensity)}});
     ordered_json json{{"solver", summary.solver},
                       {"body", summary.body},
+                      {"gloss", summary.gloss},
                       {"intensity_origin", name(summary.intensity_origin)},
                       {"intensities", intensities},
                       {"images", summary.images},

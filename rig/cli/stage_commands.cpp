@@ -50,6 +50,7 @@ std::string describe(const NormalsSummary& summary) {
         fmt::format("{} pixels from {} photographs ({}), residual {:.4f} of full scale, {:.2f} s", summary.pixels,
                     summary.images, summary.solver, summary.residual_rms, summary.seconds.solve);
     if (summary.body != "lambert") text += fmt::format("\nthe material's body follows the law '{}'", summary.body);
+    if (summary.gloss != "none") text += fmt::format("\nits gloss follows the law '{}'", summary.gloss);
     if (summary.intensity_origin == IntensityOrigin::estimated) text += "\nwith estimated lamp intensities";
     if (summary.mean_angular_error_deg)
         text += fmt::format("\nmean angular error against the truth that came with the pictures: {:.2f} degrees",

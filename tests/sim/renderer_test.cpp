@@ -263,6 +263,30 @@ TEST(Renderer, PerspectiveShowsWhatIsNearerLarger) {
     EXPECT_NEAR(mask_area(render_truth(scene)), std::numbers::pi * nearer.radius * nearer.radius, 60.0);
 }
 
+TEST(Truth, NormalsAreUnitVectorsUnderReliefOnEveryShape) {
+    for (const std::string shape : {"sphere", "torus", "relief", "teapot"}) {
+        const SceneTruth truth = render_truth(scene_of(shape + "-brick", 96, lamps_at({{0, 0, 1}})));
+        for (std::size_t i = 0; i < truth.mask.size(); ++i) {
+            if (!truth.mask[i]) continue;
+            const float* n = &truth.normals.samples[3 * i];
+            ASSERT_NEAR(n[0] * n[0] + n[1] * n[1] + n[2] * n[2], 1.0F, 1e-5F) << shape << ' ' << i;
+        }
+    }
+}
+
+/// The bricks of a ball are there: without its parameters all of it would be mortar.
+TEST(Truth, SphereShowsBricksAndMortar) {
+    const SceneTruth truth = render_truth(scene_of("sphere-brick", 160, lamps_at({{0, 0, 1}})));
+    int brick = 0, mortar = 0;
+    for (std::size_t i = 0; i < truth.mask.size(); ++i) {
+        if (!truth.mask[i]) continue;
+        const float* albedo = &truth.albedo.samples[3 * i];
+        ++(albedo[0] > 1.5F * albedo[2] ? brick : mortar);
+    }
+    EXPECT_GT(brick, 3 * mortar);
+    EXPECT_GT(mortar, 100);
+}
+
 TEST(Renderer, SameBitsOnAnyNumberOfThreads) {
     const auto render = [](std::size_t threads) {
         const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);

@@ -16,8 +16,26 @@ namespace darkbox::test {
 struct SimulatedStack {
     PhotoStack stack;
     Lights lights;
-    cv::Mat3f normals;
+    cv::Mat3f normals;  ///< the mean over what a pixel shows: its centre alone is another normal where relief is fine
 };
+
+/// The mean of the object's normals along a pixel's camera rays, which are the centres of a finer picture's pixels.
+inline cv::Mat3f mean_normals(sim::Scene scene) {
+    constexpr int fine = sim::rays_per_pixel_side;
+    cv::Mat3f means(scene.view.height, scene.view.width, cv::Vec3f::all(0));
+    scene.view.width *= fine;
+    scene.view.height *= fine;
+    scene.view.mm_per_pixel /= fine;
+    const sim::SceneTruth truth = sim::render_truth(scene);
+    for (int y = 0; y < means.rows * fine; ++y)
+        for (int x = 0; x < means.cols * fine; ++x) {
+            const float* n = truth.normals.pixel(x, y);
+            means(y / fine, x / fine) += cv::Vec3f(n[0], n[1], n[2]);
+        }
+    for (cv::Vec3f& n : means)
+        if (const double length = cv::norm(n); length > 0) n *= static_cast<float>(1.0 / length);
+    return means;
+}
 
 inline cv::Mat3f linear(const sim::Sensor& sensor, const std::vector<std::uint16_t>& samples, cv::Size size) {
     cv::Mat3f image(size);
@@ -60,7 +78,7 @@ inline SimulatedStack simulated_stack(const std::string& scene_name, int lamps, 
         shot.lights.push_back(light);
     }
     cv::Mat1b mask(size, uchar{0});
-    shot.normals = cv::Mat3f(size, cv::Vec3f::all(0));
+    shot.normals = mean_normals(scene);
     for (int y = 1; y + 1 < size.height; ++y)
         for (int x = 1; x + 1 < size.width; ++x) {
             bool inside = true;
@@ -68,8 +86,6 @@ inline SimulatedStack simulated_stack(const std::string& scene_name, int lamps, 
                 for (int dx = -1; dx <= 1; ++dx)
                     inside = inside && truth.mask[static_cast<std::size_t>((y + dy) * size.width + x + dx)] != 0;
             mask(y, x) = inside ? 255 : 0;
-            const float* n = truth.normals.pixel(x, y);
-            shot.normals(y, x) = {n[0], n[1], n[2]};
         }
     shot.stack.mask = mask;
     return shot;

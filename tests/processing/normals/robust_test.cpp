@@ -4,10 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <string>
 
 #include "acquisition/frame/error.h"
+#include "processing/normals/gloss_law.h"
 #include "tests/processing/normals/lit_sphere.h"
-#include "tests/support/simulated_stack.h"
 
 namespace darkbox {
 namespace {
@@ -56,23 +57,35 @@ TEST(Robust, HighlightsAreLeftOut) {
         }
 }
 
-TEST(Robust, GlossyScenesWithCastShadows) {
-    for (const std::string scene :
-         {"sphere-phong60n10", "torus-phong60n30", "torus-phong30n100", "teapot-phong30n30"}) {
-        const test::SimulatedStack shot = test::simulated_stack(scene, 24, 80);
-        const auto mean_error = [&](Solver solver) {
-            const auto result = photometric_stereo(shot.stack, shot.lights, with(solver));
-            double sum = 0;
-            for (int y = 0; y < shot.normals.rows; ++y)
-                for (int x = 0; x < shot.normals.cols; ++x) {
-                    if (!shot.stack.mask(y, x)) continue;
-                    const cv::Vec3f &n = result.normals.normal(y, x), &t = shot.normals(y, x);
-                    sum += result.normals.valid(y, x) ? angle_deg({n[0], n[1], n[2]}, {t[0], t[1], t[2]}) : 90.0;
-                }
-            return sum / cv::countNonZero(shot.stack.mask);
-        };
-        EXPECT_LE(mean_error(Solver::robust), mean_error(Solver::lsq) / 3) << scene;
+TEST(Robust, FindsABroadLobeAndKeepsItOutOfTheAlbedo) {
+    const LitSphere sphere(spiral_lights(24), phong(0.3, 10), 48, 75);
+    const auto result = photometric_stereo(sphere.stack, sphere.lights, with(Solver::robust));
+    EXPECT_EQ(result.model.law.kind, BodyKind::lambert);
+    EXPECT_NEAR(result.model.gloss.strength, 0.3, 0.1);
+    EXPECT_NEAR(result.model.gloss.exponent, 10, 3);
+    EXPECT_LE(mean_of(sphere.errors_deg(result)), 0.1);
+    EXPECT_NEAR(result.albedo.albedo(24, 24)[1], 0.6, 0.03);
+}
+
+TEST(Robust, FindsNoLobeOnMattBodies) {
+    LitSphere sphere(spiral_lights(24), test::lambert, 48, 75);
+    sphere.add_noise(camera_noise, 1);
+    EXPECT_FALSE(photometric_stereo(sphere.stack, sphere.lights, with(Solver::robust)).model.gloss.present());
+}
+
+/// The derivative that the solver steps along, against differences.
+TEST(Gloss, SlopeIsTheDerivative) {
+    const GlossLaw law{0.4, 10};
+    const Eigen::Vector3f normal = Eigen::Vector3f(0.2F, -0.3F, 0.9F).normalized();
+    const Eigen::Vector3f light = Eigen::Vector3f(0.5F, -0.2F, 0.8F).normalized(), view(0, 0, 1);
+    constexpr float step = 1e-3F;
+    for (int axis = 0; axis < 3; ++axis) {
+        const Eigen::Vector3f d = step * Eigen::Vector3f::Unit(axis);
+        const float change =
+            gloss_at(law, normal + d, light, view).value - gloss_at(law, normal - d, light, view).value;
+        EXPECT_NEAR(gloss_at(law, normal, light, view).slope[axis], change / (2 * step), 2e-3F) << axis;
     }
+    EXPECT_EQ(gloss_at(law, normal, -normal, view).value, 0.0F);
 }
 
 TEST(Robust, CostsNothingWhereLeastSquaresIsRight) {
