@@ -14,8 +14,8 @@ namespace {
 
 constexpr double step_px = 0.5;
 constexpr double blur_px = 0.8;           ///< applied to the picture before it is read
-constexpr double read_blur_px = 0.92;     ///< of the profiles: that, the pixels', and the interpolation's
-constexpr double margin_px = 2.5;         ///< of profile beyond the offsets that are tried
+constexpr double read_blur_px = 0.92;     ///< of rough profiles: that, the pixels', and the interpolation's
+constexpr double margin_px = 2.0;         ///< of profile beyond the offsets that are tried
 constexpr double least_significance = 4;  ///< standard deviations of noise that an edge explains
 constexpr double floor_radiance = 1.0 / 1024;
 
@@ -36,13 +36,13 @@ std::optional<double> sample(const cv::Mat1f& image, double x, double y) {
 }
 
 /// Brightness along a radius, `half` steps to both sides of the circle; empty where it leaves the picture.
-std::vector<double> profile(const cv::Mat1f& image, const Circle& circle, cv::Point2d out, int half) {
-    std::vector<double> values;
+Eigen::VectorXd profile(const cv::Mat1f& image, const Circle& circle, cv::Point2d out, int half) {
+    Eigen::VectorXd values(2 * half + 1);
     for (int i = -half; i <= half; ++i) {
         const double radius = circle.radius + i * step_px;
         const auto value = sample(image, circle.x + radius * out.x, circle.y + radius * out.y);
         if (!value) return {};
-        values.push_back(*value);
+        values[i + half] = *value;
     }
     return values;
 }
@@ -57,20 +57,30 @@ double median(std::vector<double> values) {
     return *middle;
 }
 
-std::vector<Reading> read_edges(const cv::Mat1f& image, const Circle& circle, double reach) {
-    const int half = static_cast<int>(std::ceil((reach + margin_px) / step_px));
-    const ProfileModel model(half, step_px, read_blur_px, reach);
-    std::vector<Reading> readings;
+/// `shape`: none where it is to be learnt from the profiles.
+std::vector<Reading> read_edges(const cv::Mat1f& image, const Circle& circle, double reach,
+                                const std::optional<EdgeShape>& shape) {
+    Profiles profiles{static_cast<int>(std::ceil((reach + margin_px) / step_px)), step_px, {}};
+    std::vector<cv::Point2d> outwards;
     const std::size_t n = directions(circle);
     for (std::size_t i = 0; i < n; ++i) {
         const double angle = 2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(n);
-        const cv::Point2d out(std::cos(angle), std::sin(angle)), centre(circle.x, circle.y);
-        const std::vector<double> p = profile(image, circle, out, half);
-        if (p.empty()) continue;
+        const cv::Point2d out(std::cos(angle), std::sin(angle));
+        Eigen::VectorXd values = profile(image, circle, out, profiles.half);
+        if (values.size() == 0) continue;
+        profiles.values.push_back(std::move(values));
+        outwards.push_back(out);
+    }
+    std::vector<Reading> readings;
+    if (profiles.values.empty()) return readings;
+    const ProfileModel model(profiles.half, step_px, shape ? *shape : shape_of_edge(profiles, reach), reach);
+    for (std::size_t i = 0; i < profiles.values.size(); ++i) {
+        const Eigen::VectorXd& p = profiles.values[i];
         const auto edge = model.fit(p);
         if (!edge) continue;
-        const double level = std::max(0.0, p[p.size() / 2]) + floor_radiance;
-        readings.push_back({centre + (circle.radius + edge->offset) * out, edge->height / level, edge->height,
+        const double level = std::max(0.0, p[profiles.half]) + floor_radiance;
+        const cv::Point2d at = cv::Point2d(circle.x, circle.y) + (circle.radius + edge->offset) * outwards[i];
+        readings.push_back({at, edge->height / level, edge->height,
                             std::sqrt(std::max(0.0, edge->residual) / static_cast<double>(p.size()))});
     }
     return readings;
@@ -78,8 +88,9 @@ std::vector<Reading> read_edges(const cv::Mat1f& image, const Circle& circle, do
 
 /// Readings all around, without those that noise explains and those far weaker than the strong ones: dark on dark has
 /// no outline to read.
-std::vector<cv::Point2d> read_outline(const cv::Mat1f& image, const Circle& circle, double reach) {
-    const std::vector<Reading> readings = read_edges(image, circle, reach);
+std::vector<cv::Point2d> read_outline(const cv::Mat1f& image, const Circle& circle, double reach,
+                                      const std::optional<EdgeShape>& shape) {
+    const std::vector<Reading> readings = read_edges(image, circle, reach, shape);
     if (readings.empty()) return {};
     std::vector<double> strengths, noises;
     for (const Reading& r : readings) {
@@ -99,8 +110,10 @@ BallContour settled(const cv::Mat1f& image, const Circle& start, double first_re
     BallContour contour;
     contour.circle = start;
     std::vector<cv::Point2d> points;
-    for (const double reach : {first_reach, first_reach / 2, 3.0, 2.0, 2.0}) {
-        points = read_outline(image, contour.circle, std::max(2.0, reach));
+    for (const double reach : {first_reach, first_reach / 2, 3.0, 2.0, 2.0, 2.0}) {
+        const std::optional<EdgeShape> shape =
+            reach > 2 ? std::optional(EdgeShape{read_blur_px, std::nullopt}) : std::nullopt;
+        points = read_outline(image, contour.circle, std::max(2.0, reach), shape);
         contour.circle = fit_circle_robust(points, contour.circle, std::max(0.3, reach / 8));
     }
     const double limit = 3 * std::max(0.1, robust_spread(points, contour.circle));

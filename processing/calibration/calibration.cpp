@@ -18,7 +18,7 @@ namespace darkbox {
 namespace {
 
 constexpr double hand_sigma_px = 0.5;          ///< a highlight read by hand
-constexpr double rim_bias_px = 0.07;           ///< of an outline's centre per axis, on a ball of one pixel's radius
+constexpr double rim_bias_px = 0.05;           ///< of an outline's centre per axis, on a ball of one pixel's radius
 constexpr double ball_depth_sigma_mm = 10;     ///< balls stand about as far off as the object
 constexpr double ball_size_tolerance = 0.002;  ///< of a diameter that tells a perspective camera the depth
 constexpr double size_mismatch = 0.03;         ///< of the diameter: the scale or the diameter is wrong

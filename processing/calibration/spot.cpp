@@ -9,14 +9,14 @@
 namespace darkbox {
 namespace {
 
-constexpr double floor_share = 0.1;   ///< of a spot's height: radiance that counts
-constexpr double upper_share = 0.45;  ///< its upper part, for comparison
-constexpr double least_sigma_px = 0.005;
-constexpr double blind_px = 0.29;         ///< standard deviation of a place known to one pixel
-constexpr double blur_px2 = 0.4;          ///< second moment that pixels and optics add to a spot
-constexpr double bloom_px = 0.7;          ///< by which a saturated spot outgrows the lamp's image
-constexpr double border_sigma = 0.15;     ///< px; of a saturated spot of radius 1, less for larger ones: simulated
-constexpr double part_sigma = 0.25;       ///< of the upper and lower parts' disagreement: simulated
+constexpr double floor_share = 0.1;        ///< of a spot's height: radiance that counts
+constexpr double upper_share = 0.45;       ///< its upper part, for comparison
+constexpr double steady_sigma_px = 0.007;  ///< what pixels and the threshold leave without noise: simulated
+constexpr double blind_px = 0.29;          ///< standard deviation of a place known to one pixel
+constexpr double blur_px2 = 0.4;           ///< second moment that pixels and optics add to a spot
+constexpr double bloom_px = 0.7;           ///< by which a saturated spot outgrows the lamp's image
+constexpr double border_sigma = 0.15;      ///< px; of a saturated spot of radius 1, less for larger ones: simulated
+constexpr double part_sigma = 0.1;         ///< of the upper and lower parts' disagreement: simulated
 constexpr double round_residual = 0.12;   ///< squares per pixel of border, below which a saturated spot is a round lamp
 constexpr double odd_shape_sigma = 0.02;  ///< of the radius: a saturated spot of another shape hides its lamp's middle
 
@@ -58,8 +58,8 @@ SpotMeasure by_centroid(const SpotPatch& patch) {
     measure.radius_px = 2 * std::sqrt(std::max(0.0, whole.spread - blur_px2));  // of a uniform disc
     const double pixel = blind_px * std::exp(-whole.spread / 0.06);
     const double disagreement = part_sigma * std::hypot(whole.at.x - upper.at.x, whole.at.y - upper.at.y);
-    measure.sigma_px = std::hypot(patch.noise * noise_gain(patch, whole), pixel, disagreement);
-    measure.sigma_px = std::max(measure.sigma_px, least_sigma_px);
+    measure.sigma_px =
+        std::hypot(patch.noise * noise_gain(patch, whole), std::hypot(pixel, steady_sigma_px, disagreement));
     return measure;
 }
 

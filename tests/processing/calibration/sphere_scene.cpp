@@ -16,7 +16,7 @@ constexpr int grid = 4;  ///< sub-pixels per side
 constexpr double wall_z = -60;
 constexpr double far_off = 5000;
 constexpr int room_waves = 6;
-constexpr double room_detail = 2;
+constexpr double room_detail = 0.8;  ///< radians of phase per radian
 constexpr double room_radiance = 0.03;
 
 std::optional<double> distance_to(const SphereScene::Sphere& sphere, const Vector3d& from, const Vector3d& along) {
@@ -67,7 +67,7 @@ SphereRenderer::Ray SphereRenderer::meeting(const Vector3d& from, const Vector3d
         ray.meets = Ray::Meets::object;
         ray.point = from + *t * along;
         ray.normal = (ray.point - scene_.object.centre) / scene_.object.radius;
-    } else if (along.z() < 0) {
+    } else if (scene_.wall && along.z() < 0) {
         ray.meets = Ray::Meets::wall;
         ray.point = from + (wall_z - from.z()) / along.z() * along;
     }
@@ -90,8 +90,11 @@ double SphereRenderer::radiance(const Ray& ray, const Vector3d& lamp) const {
     if (!ray.mirrored) return ray.meets == Ray::Meets::room ? room(ray.along) : matt_radiance(ray, lamp);
     const Vector3d to_lamp = scene_.near ? (lamp - ray.from).normalized() : lamp;
     const double reach = scene_.near ? scene_.lamp_radius / (lamp - ray.from).norm() : scene_.lamp_radius;
-    if (ray.along.dot(to_lamp) > std::cos(reach)) return scene_.lamp_radiance;
-    return 0.5 * (ray.meets == Ray::Meets::room ? room(ray.along) : matt_radiance(ray, lamp));
+    // A frosted rim; a sharp one would show the sub-pixels' grid in the highlight's place.
+    const double angle = 2 * std::asin(std::min(1.0, 0.5 * (ray.along - to_lamp).norm()));
+    const double within = std::clamp((1.25 * reach - angle) / (0.5 * reach), 0.0, 1.0);
+    return scene_.lamp_radiance * within +
+           (1 - within) * 0.5 * (ray.meets == Ray::Meets::room ? room(ray.along) : matt_radiance(ray, lamp));
 }
 
 cv::Mat1f SphereRenderer::render(const Vector3d& lamp) const {

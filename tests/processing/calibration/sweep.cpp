@@ -30,6 +30,7 @@ Capture arranged(const SweepSetting& setting, int index) {
     SphereScene& scene = capture.scene;
     scene.mm_per_pixel = ball_radius_mm / setting.radius_px;
     scene.lamp_radiance = setting.lamp_radiance;
+    scene.wall = setting.wall;
     scene.near = setting.lamps != Lamps::distant;
     scene.lamp_radius = scene.near ? 50 : 0.05;
     scene.room = 31 * setting.noise.seed + static_cast<std::uint64_t>(index);

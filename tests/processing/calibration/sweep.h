@@ -15,6 +15,7 @@ struct SweepSetting {
     int lights = 12;
     enum class Lamps { distant, near_two_balls, near_one_ball } lamps = Lamps::distant;
     bool perspective = false;
+    bool wall = true;            ///< behind the balls; else they mirror a room's gradients all around
     double lamp_radiance = 0.9;  ///< above 1: highlights clip
     int captures = 4;            ///< with the ball at another fraction of a pixel and the lamps turned
 };
