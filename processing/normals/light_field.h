@@ -36,6 +36,8 @@ public:
 
     /// All used lights are distant: the same at every pixel.
     bool uniform() const { return uniform_; }
+    /// The directions are those at the surface: it is known, or all used lights are distant.
+    bool known() const { return uniform_ || !geometry_.height_mm.empty(); }
     std::size_t size() const { return set_.lights.size(); }
     const LightSet& set() const { return set_; }
     /// The calibration's record of the k-th used light.

@@ -184,7 +184,7 @@ SampleModel find_sample_model(PhotoSource& photos, const LightField& field, cons
     if (given.law && given.noise) return model;
     std::vector<Pair> pairs = read_pairs(photos, field, band_rows, work);
     if (!given.noise) model.noise = find_noise(pairs, field);
-    if (!given.law && field.size() >= least_lights_of_law) {
+    if (!given.law && field.size() >= least_lights_of_law && field.known()) {
         const SurfaceLaw found = find_surface_law(pixels_of_law(pairs, model.noise, field));
         model.law = found.body;
         model.gloss = found.gloss;

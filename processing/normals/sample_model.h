@@ -24,8 +24,9 @@ struct GivenModel {
 /// classes gives read noise and shot gain. Cameras whose neighbouring samples share noise (after demosaicing) look
 /// better than they are.
 ///
-/// Laws of body and gloss: find_surface_law() on at most a thousand of these pixels. With fewer than seven lights
-/// Lambert's law without gloss is kept; a given body law comes without gloss.
+/// Laws of body and gloss: find_surface_law() on at most a thousand of these pixels. With fewer than seven lights, and
+/// while near lights fall on a surface whose height is not known yet (a law would be bent to explain that), Lambert's
+/// law without gloss is kept; a given body law comes without gloss.
 SampleModel find_sample_model(PhotoSource& photos, const LightField& field, const GivenModel& given, int band_rows,
                               const WorkContext& work);
 
