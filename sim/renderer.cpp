@@ -188,11 +188,18 @@ std::vector<RgbImage> Renderer::render(std::span<const LampId> lamps) const {
     return pictures;
 }
 
+/// As in SceneTruth, of what a ray that meets the object shows.
+std::uint16_t Renderer::texture_material(const Ray& ray) const {
+    const auto hit = tracer_.first_hit(ray);
+    return static_cast<std::uint16_t>(hit.value().material->texture->material(hit->point) + 1);
+}
+
 SceneTruth Renderer::truth() const {
     const View& view = scene_.view;
     SceneTruth truth{RgbImage(view.width, view.height), RgbImage(view.width, view.height),
                      std::vector<char>(static_cast<std::size_t>(view.width) * view.height, 0),
-                     std::vector<float>(static_cast<std::size_t>(view.width) * view.height, 0.0F)};
+                     std::vector<float>(static_cast<std::size_t>(view.width) * view.height, 0.0F),
+                     std::vector<std::uint16_t>(static_cast<std::size_t>(view.width) * view.height, 0)};
     for_each_row(view.height, [&](int row) {
         for (int column = 0; column < view.width; ++column) {
             const Sample centre = sample(camera_ray(view, column, row));
@@ -200,6 +207,7 @@ SceneTruth Renderer::truth() const {
             const Vec3& n = centre.seen.normal;
             const std::size_t pixel = static_cast<std::size_t>(row) * view.width + column;
             truth.mask[pixel] = 1;
+            truth.materials[pixel] = texture_material(camera_ray(view, column, row));
             truth.heights[pixel] = static_cast<float>(centre.seen.position.z);
             truth.normals.set(column, row, {n.x, n.y, n.z});
             Rgb sum;

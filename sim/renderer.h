@@ -16,10 +16,11 @@ constexpr int rays_per_pixel_side = 4;
 
 /// What is true of the object at each pixel. Background: normal, albedo and height 0.
 struct SceneTruth {
-    RgbImage normals;            ///< viewer frame, relief included, at the pixel's centre
-    RgbImage albedo;             ///< mean over the part of the pixel that the object covers
-    std::vector<char> mask;      ///< 1 where the pixel's centre shows the object
-    std::vector<float> heights;  ///< z of what the pixel's centre shows, viewer frame, mm
+    RgbImage normals;                      ///< viewer frame, relief included, at the pixel's centre
+    RgbImage albedo;                       ///< mean over the part of the pixel that the object covers
+    std::vector<char> mask;                ///< 1 where the pixel's centre shows the object
+    std::vector<float> heights;            ///< z of what the pixel's centre shows, viewer frame, mm
+    std::vector<std::uint16_t> materials;  ///< of the texture where the pixel's centre shows it, from 1; 0 = outside
 };
 
 /// Traces rays from the camera: direct light with shadows, and one reflection on the mirror balls. Interreflection on
@@ -40,6 +41,7 @@ private:
     struct Sample;
 
     Sample sample(const Ray& ray) const;
+    std::uint16_t texture_material(const Ray& ray) const;
     Fragment fragment(const Ray& ray, const std::optional<RayHit>& hit) const;
     Fragment box_fragment(const Ray& ray) const;
     Rgb radiance(const Sample& sample, const SceneLamp& lamp) const;

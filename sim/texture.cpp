@@ -1,6 +1,7 @@
 #include "sim/texture.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "sim/noise.h"
@@ -18,21 +19,38 @@ private:
     Rgb albedo_;
 };
 
+/// A point of broken stone.
+struct StonePlace {
+    StonePlace(const Vec3& p, std::uint64_t seed) {
+        const Vec3 bent = p / 11.0 + Vec3{1, 1, 1} * (0.35 * fractal_noise(p / 7.0, 3, seed + 10));
+        const Cell grain = cellular_noise(bent, seed + 20);
+        id = grain.id;
+        inside = smooth_step(0.02, 0.16, grain.second - grain.nearest);
+        ochre = smooth_step(-0.35, 0.45, fractal_noise(p / 24.0, 4, seed + 30));
+    }
+
+    std::uint64_t id = 0;  ///< of its grain
+    double inside = 0.0;   ///< 0 in the joint, 1 on the grain
+    double ochre = 0.0;    ///< 0 = grey
+};
+
 Rgb stone_colour(const Vec3& p, std::uint64_t seed) {
-    const Vec3 bent = p / 11.0 + Vec3{1, 1, 1} * (0.35 * fractal_noise(p / 7.0, 3, seed + 10));
-    const Cell grain = cellular_noise(bent, seed + 20);
-    const double ochre = smooth_step(-0.35, 0.45, fractal_noise(p / 24.0, 4, seed + 30));
-    const Rgb ground = mix(Rgb{0.52, 0.52, 0.53}, Rgb{0.84, 0.69, 0.48}, ochre);
-    const double tone = 0.75 + 0.35 * (static_cast<double>(grain.id >> 40) * 0x1.0p-24);
-    const double joint = smooth_step(0.02, 0.16, grain.second - grain.nearest);
+    const StonePlace place(p, seed);
+    const Rgb ground = mix(Rgb{0.52, 0.52, 0.53}, Rgb{0.84, 0.69, 0.48}, place.ochre);
+    const double tone = 0.75 + 0.35 * (static_cast<double>(place.id >> 40) * 0x1.0p-24);
     const double dust = 1.0 + 0.12 * fractal_noise(p / 2.5, 2, seed + 40);
-    return ground * (tone * dust * (0.45 + 0.55 * joint));
+    return ground * (tone * dust * (0.45 + 0.55 * place.inside));
 }
 
 class Stone final : public Texture {
 public:
     explicit Stone(std::uint64_t seed) : seed_(seed) {}
     Rgb albedo(const SurfacePoint& point) const override { return stone_colour(point.position, seed_); }
+    int material(const SurfacePoint& point) const override {
+        const StonePlace place(point.position, seed_);
+        if (place.inside < 0.5) return 0;
+        return place.ochre < 0.5 ? 1 : 2;
+    }
 
 private:
     std::uint64_t seed_;
@@ -43,13 +61,15 @@ public:
     explicit Moss(std::uint64_t seed) : seed_(seed) {}
     Rgb albedo(const SurfacePoint& point) const override {
         const Vec3& p = point.position;
-        const double cover = smooth_step(-0.02, 0.16, fractal_noise(p / 17.0, 5, seed_ + 1));
         const double lush = 0.5 + 0.5 * fractal_noise(p / 3.2, 3, seed_ + 2);
         const Rgb moss = mix(Rgb{0.10, 0.20, 0.05}, Rgb{0.50, 0.68, 0.20}, std::clamp(lush, 0.0, 1.0));
-        return mix(stone_colour(p, seed_ + 3), moss, cover);
+        return mix(stone_colour(p, seed_ + 3), moss, cover(p));
     }
+    int material(const SurfacePoint& point) const override { return cover(point.position) < 0.5 ? 0 : 1; }
 
 private:
+    double cover(const Vec3& p) const { return smooth_step(-0.02, 0.16, fractal_noise(p / 17.0, 5, seed_ + 1)); }
+
     std::uint64_t seed_;
 };
 
@@ -58,15 +78,19 @@ public:
     explicit Marble(std::uint64_t seed) : seed_(seed) {}
     Rgb albedo(const SurfacePoint& point) const override {
         const Vec3& p = point.position;
-        const double bend = 3.2 * fractal_noise(p / 26.0, 6, seed_);
-        const double wave = std::abs(std::sin(dot(p, Vec3{0.08, 0.14, 0.11}) + bend));
-        const double vein = 1.0 - smooth_step(0.0, 0.42, wave);
         const double cloud = 0.5 + 0.5 * fractal_noise(p / 14.0, 4, seed_ + 7);
         const Rgb ground = mix(Rgb{0.84, 0.82, 0.78}, Rgb{0.66, 0.68, 0.72}, std::clamp(cloud, 0.0, 1.0));
-        return mix(ground, Rgb{0.17, 0.20, 0.27}, 0.85 * vein);
+        return mix(ground, Rgb{0.17, 0.20, 0.27}, 0.85 * vein(p));
     }
+    int material(const SurfacePoint& point) const override { return vein(point.position) < 0.5 ? 0 : 1; }
 
 private:
+    double vein(const Vec3& p) const {
+        const double bend = 3.2 * fractal_noise(p / 26.0, 6, seed_);
+        const double wave = std::abs(std::sin(dot(p, Vec3{0.08, 0.14, 0.11}) + bend));
+        return 1.0 - smooth_step(0.0, 0.42, wave);
+    }
+
     std::uint64_t seed_;
 };
 
@@ -74,18 +98,35 @@ class Speckle final : public Texture {
 public:
     explicit Speckle(std::uint64_t seed) : seed_(seed) {}
     Rgb albedo(const SurfacePoint& point) const override {
-        const Rgb ground = Rgb{0.78, 0.72, 0.60} * (1.0 + 0.05 * fractal_noise(point.position / 9.0, 3, seed_));
-        const Rgb coarse = speckled(ground, point.position / 7.5, 1);
-        return speckled(coarse, point.position / 3.6, 2);
+        Rgb colour = Rgb{0.78, 0.72, 0.60} * (1.0 + 0.05 * fractal_noise(point.position / 9.0, 3, seed_));
+        for (const Grain& grain : grains_at(point))
+            colour = mix(colour, grain.dark ? Rgb{0.12, 0.09, 0.08} : Rgb{0.58, 0.20, 0.11}, grain.cover);
+        return colour;
+    }
+    int material(const SurfacePoint& point) const override {
+        int top = 0;
+        for (const Grain& grain : grains_at(point))
+            if (grain.cover >= 0.5) top = grain.dark ? 1 : 2;
+        return top;
     }
 
 private:
-    Rgb speckled(const Rgb& ground, const Vec3& p, std::uint64_t layer) const {
+    struct Grain {
+        double cover = 0.0;  ///< 0 beside it, 1 on it
+        bool dark = false;   ///< else red
+    };
+
+    /// The coarse grain nearest to a point, then the fine one, which lies above it.
+    std::array<Grain, 2> grains_at(const SurfacePoint& point) const {
+        return {grain_at(point.position / 7.5, 1), grain_at(point.position / 3.6, 2)};
+    }
+
+    Grain grain_at(const Vec3& p, std::uint64_t layer) const {
         const Cell cell = cellular_noise(p, seed_ + 100 * layer);
         CounterRandom random(cell.id);
         const double radius = 0.16 + 0.26 * random.uniform();
-        const double edge = 1.0 - smooth_step(radius - 0.05, radius + 0.05, cell.nearest);
-        return mix(ground, random.uniform() < 0.6 ? Rgb{0.12, 0.09, 0.08} : Rgb{0.58, 0.20, 0.11}, edge);
+        const double cover = 1.0 - smooth_step(radius - 0.05, radius + 0.05, cell.nearest);
+        return {cover, random.uniform() < 0.6};
     }
 
     std::uint64_t seed_;
@@ -103,6 +144,8 @@ public:
         const double sand = 1.0 + 0.16 * fractal_noise(point.position / 2.0, 2, seed_ + 2);
         return mix(Rgb{0.62, 0.59, 0.53} * sand, fired * scorch, place.inside);
     }
+
+    int material(const SurfacePoint& point) const override { return place_of(point).inside < 0.5 ? 0 : 1; }
 
     double height_mm(const SurfacePoint& point) const override {
         const Place place = place_of(point);

@@ -22,6 +22,8 @@ class Texture {
 public:
     virtual ~Texture() = default;
     virtual Rgb albedo(const SurfacePoint& point) const = 0;
+    /// Which of the texture's materials the point is of, 0...: what texels are to tell apart.
+    virtual int material(const SurfacePoint&) const { return 0; }
     /// Relief above the smooth surface, mm; turns the normals only.
     virtual double height_mm(const SurfacePoint&) const { return 0.0; }
     virtual bool has_relief() const { return false; }
@@ -29,15 +31,15 @@ public:
 using TexturePtr = std::shared_ptr<const Texture>;
 
 TexturePtr plain_texture(const Rgb& albedo);
-/// Broken grey and ochre stone with darker joints between its grains.
+/// Broken grey and ochre stone with darker joints between its grains. Materials: joint, grey, ochre.
 TexturePtr stone_texture(std::uint64_t seed);
-/// Stone overgrown by blotches of moss.
+/// Stone overgrown by blotches of moss. Materials: stone, moss.
 TexturePtr moss_texture(std::uint64_t seed);
-/// Pale marble with dark veins.
+/// Pale marble with dark veins. Materials: marble, vein.
 TexturePtr marble_texture(std::uint64_t seed);
-/// Dark and red speckles strewn over a pale ground.
+/// Dark and red speckles strewn over a pale ground. Materials: ground, dark, red.
 TexturePtr speckle_texture(std::uint64_t seed);
-/// Bricks in running bond, one to a tile, with mortar lying deeper than the bricks.
+/// Bricks in running bond, one to a tile, with mortar lying deeper than the bricks. Materials: mortar, brick.
 TexturePtr brick_texture(std::uint64_t seed);
 
 /// The unit normal of the surface with the texture's relief (Blinn: Simulation of wrinkled surfaces, 1978).

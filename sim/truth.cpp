@@ -53,6 +53,12 @@ void write_mask(const SceneTruth& truth, const fs::path& file) {
     if (!cv::imwrite(file.string(), mask)) throw_unwritable(file, "the picture library refused");
 }
 
+void write_materials(const SceneTruth& truth, const fs::path& file) {
+    cv::Mat1w materials(truth.normals.height, truth.normals.width);
+    std::copy(truth.materials.begin(), truth.materials.end(), materials.begin());
+    if (!cv::imwrite(file.string(), materials)) throw_unwritable(file, "the picture library refused");
+}
+
 void write_text(const std::string& text, const fs::path& file) {
     std::ofstream stream(file, std::ios::binary);
     stream << text << std::flush;
@@ -106,6 +112,7 @@ void write_truth(const Scene& scene, const std::vector<ExposureTruth>& exposures
     write_exr(truth.albedo.samples, truth.albedo.width, {"R", "G", "B"}, folder / "albedo.exr");
     write_exr(truth.heights, truth.normals.width, {"Y"}, folder / "height.exr");
     write_mask(truth, folder / "mask.png");
+    write_materials(truth, folder / "texels.png");
     write_text(lights_lp(scene), folder / "lights.lp");
     write_text(lamps_json(scene, exposures), folder / "lamps.json");
     write_text(ball_json(scene), folder / "ball.json");

@@ -123,9 +123,9 @@ struct Projection {
         const Floats d;
         const float* p = light.pseudo_column.data();
         const Vector grey = mean(sample);
-        x = hn::Add(x, hn::Mul(hn::Set(d, p[0]), grey));
-        y = hn::Add(y, hn::Mul(hn::Set(d, p[1]), grey));
-        z = hn::Add(z, hn::Mul(hn::Set(d, p[2]), grey));
+        x = hn::MulAdd(hn::Set(d, p[0]), grey, x);
+        y = hn::MulAdd(hn::Set(d, p[1]), grey, y);
+        z = hn::MulAdd(hn::Set(d, p[2]), grey, z);
     }
 
     /// Returns how many pixels of the object are not finite.
@@ -149,15 +149,15 @@ struct AlbedoSums {
     void add(const SolverLight& light, const Projection& g, const Colour& sample) {
         const Floats d;
         const float* l = light.direction.data();
-        const Vector shading = hn::Add(hn::Add(hn::Mul(g.x, hn::Set(d, l[0])), hn::Mul(g.y, hn::Set(d, l[1]))),
-                                       hn::Mul(g.z, hn::Set(d, l[2])));
+        const Vector shading =
+            hn::MulAdd(g.z, hn::Set(d, l[2]), hn::MulAdd(g.y, hn::Set(d, l[1]), hn::Mul(g.x, hn::Set(d, l[0]))));
         const Vector lit = hn::Max(shading, hn::Zero(d));
         const Vector error = hn::Sub(mean(sample), shading);
-        red = hn::Add(red, hn::Mul(sample.r, lit));
-        green = hn::Add(green, hn::Mul(sample.g, lit));
-        blue = hn::Add(blue, hn::Mul(sample.b, lit));
-        weight = hn::Add(weight, hn::Mul(lit, lit));
-        squared = hn::Add(squared, hn::Mul(error, error));
+        red = hn::MulAdd(sample.r, lit, red);
+        green = hn::MulAdd(sample.g, lit, green);
+        blue = hn::MulAdd(sample.b, lit, blue);
+        weight = hn::MulAdd(lit, lit, weight);
+        squared = hn::MulAdd(error, error, squared);
     }
 
     void put(std::size_t i, LeastSquaresBlock& block) const {

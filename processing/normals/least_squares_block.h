@@ -13,7 +13,8 @@ namespace darkbox {
 
 // The arithmetic of least squares on a run of neighbouring pixels, for the widest vectors the processor has. A block's
 // samples of all lights stay in the nearest caches between the passes over them. Every pixel's figures come from the
-// same operations in the same order whatever the vectors' width and the block's place: same bits on every processor.
+// same operations in the same order whatever the vectors' width and the block's place: same bits on every processor
+// that multiplies and adds in one rounding.
 
 inline constexpr int block_pixels = 128;
 

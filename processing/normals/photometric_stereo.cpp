@@ -16,8 +16,9 @@
 #include "processing/normals/bands.h"
 #include "processing/normals/by_pixel.h"
 #include "processing/normals/least_squares.h"
+#include "processing/normals/least_squares_sigma.h"
 #include "processing/normals/light_set.h"
-#include "processing/normals/predicted_sigma.h"
+#include "processing/normals/median_variance.h"
 
 namespace darkbox {
 namespace {
@@ -134,9 +135,9 @@ SampleModel model_for(PhotoSource& photos, const LightField& field, const Photom
 
 /// The confidence of least squares over distant lights, which the pixel loops leave to the finished maps.
 void predict_least_squares_sigma(const LightField& field, const NoiseModel& noise, SolvedMaps& maps) {
-    const LeastSquaresSigma sigma(field, noise);
+    const SigmaPolynomial polynomial(field, noise);
     const float variance = median_variance(maps);
-    tbb::parallel_for(0, maps.valid.rows, [&](int row) { sigma.write_row(variance, row, maps); });
+    tbb::parallel_for(0, maps.valid.rows, [&](int row) { write_sigma_row(polynomial, variance, row, maps); });
 }
 
 PhotometricStereoResult solve(PhotoSource& photos, const LightField& field, const PhotometricStereoOptions& options,

@@ -2,9 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "processing/normals/least_squares.h"
 #include "processing/normals/light_field.h"
-#include "processing/normals/noise_model.h"
 #include "processing/normals/pixel_solver.h"
 
 namespace darkbox {
@@ -19,34 +17,8 @@ namespace darkbox {
 /// For a fit with weights, at the pixel whose samples the solver holds.
 float predicted_sigma_deg(const PixelFit& fit, const PixelSolver& solver, const LightField& field);
 
-/// The same for least squares over all distant lights, for which the propagation is a polynomial in albedo times
-/// normal. Thread-safe once made.
-class LeastSquaresSigma {
-public:
-    LeastSquaresSigma(const LightField& field, const NoiseModel& noise);
-
-    /// Writes one row of sigma_deg from the maps' other entries. A pixel's residual has few degrees of freedom: it is
-    /// pooled with `picture_residual`, the picture's median of residuals squared over degrees of freedom.
-    void write_row(float picture_variance, int row, SolvedMaps& maps) const;
-
-private:
-    using Symmetric = Eigen::Matrix<float, 6, 1>;  ///< xx, xy, xz, yy, yz, zz
-
-    float at(const Eigen::Vector3f& normal, float albedo, float variance, float used) const;
-
-    float lights_ = 0;
-    Symmetric inverse_moments_ = Symmetric::Zero();
-    Symmetric dark_ = Symmetric::Zero();                                     ///< covariance of g for g = 0
-    Eigen::Matrix<float, 6, 3> shot_ = Eigen::Matrix<float, 6, 3>::Zero();   ///< for each unit of g
-    Eigen::Matrix<float, 6, 6> lamps_ = Eigen::Matrix<float, 6, 6>::Zero();  ///< for each unit of g's products
-    bool lamps_known_ = false;                                               ///< any of them is not zero
-    float mean_dark_ = 0;  ///< variance of a sample, the same three parts
-    Eigen::Vector3f mean_shot_ = Eigen::Vector3f::Zero();
-    Symmetric mean_lamps_ = Symmetric::Zero();
-};
-
-/// The median over valid pixels of residual squared over degrees of freedom; 0 where fewer than four lights tell
-/// nothing.
-float median_variance(const SolvedMaps& maps);
+/// What a residual shows beyond the variance that was expected. By chance alone it varies by a factor of
+/// 1 + sqrt(2 / freedom) or so: up to 1 + `chance_factor` times that root nothing is shown.
+inline constexpr float chance_factor = 2.0F;
 
 }  // namespace darkbox

@@ -11,11 +11,10 @@
 #include "processing/maps/parallel.h"
 #include "processing/texels/kmeans.h"
 #include "processing/texels/neighbourhood.h"
+#include "processing/texels/texel_sizes.h"
 
 namespace darkbox {
 namespace {
-
-using Pixels = std::vector<cv::Point>;
 
 void require_range(const char* field, int value, int lowest, int highest) {
     if (value < lowest || value > highest)
@@ -35,42 +34,34 @@ AlbedoMap without_non_finite(const AlbedoMap& albedo) {
     return clean;
 }
 
-Pixels valid_pixels(const AlbedoMap& albedo) {
-    Pixels pixels;
+TexelPixels valid_pixels(const AlbedoMap& albedo) {
+    TexelPixels pixels;
     for (int y = 0; y < albedo.valid.rows; ++y)
         for (int x = 0; x < albedo.valid.cols; ++x)
             if (albedo.valid(y, x) != 0) pixels.emplace_back(x, y);
     return pixels;
 }
 
-cv::Mat1f colours(const AlbedoMap& albedo, const Pixels& pixels) { return neighbourhood_vectors(albedo, pixels, 1); }
-
-std::vector<Pixels> split(const Pixels& pixels, const KMeansResult& clusters) {
-    std::vector<Pixels> groups(clusters.centres.rows);
-    for (std::size_t i = 0; i < pixels.size(); ++i) groups[clusters.label[i]].push_back(pixels[i]);
-    return groups;
-}
-
-/// The two steps of the thesis; each pixel list is one texel.
-std::vector<Pixels> texels_of(const AlbedoMap& albedo, const Pixels& pixels, const TexelOptions& options,
-                              const WorkContext& work) {
+/// The two steps of the thesis.
+std::vector<TexelPixels> texels_of(const AlbedoMap& albedo, const TexelPixels& pixels, const TexelOptions& options,
+                                   const WorkContext& work) {
     const KMeansResult by_albedo =
-        kmeans(colours(albedo, pixels), {options.albedo_clusters, options.iterations, options.seed});
-    const std::vector<Pixels> groups = split(pixels, by_albedo);
-    std::vector<Pixels> texels;
+        kmeans(Neighbourhoods(albedo, pixels, 1), {options.albedo_clusters, options.iterations, options.seed});
+    const std::vector<TexelPixels> groups = split(pixels, by_albedo);
+    std::vector<TexelPixels> texels;
     for (std::size_t g = 0; g < groups.size(); ++g) {
         if (work.cancelled()) throw Cancelled("the clustering of texels was stopped", "start it again when it suits");
         work.tell({"texels", g, groups.size(), {}});
         const KMeansResult by_neighbourhood =
-            kmeans(neighbourhood_vectors(albedo, groups[g], options.window),
+            kmeans(Neighbourhoods(albedo, groups[g], options.window),
                    {options.neighbourhood_clusters, options.iterations, options.seed + g + 1});
-        for (Pixels& texel : split(groups[g], by_neighbourhood)) texels.push_back(std::move(texel));
+        for (TexelPixels& texel : split(groups[g], by_neighbourhood)) texels.push_back(std::move(texel));
     }
     work.tell({"texels", groups.size(), groups.size(), {}});
     return texels;
 }
 
-IndexMap index_of(const std::vector<Pixels>& texels, cv::Size size) {
+IndexMap index_of(const std::vector<TexelPixels>& texels, cv::Size size) {
     IndexMap index{cv::Mat1w(size, 0), static_cast<int>(texels.size())};
     for (std::size_t k = 0; k < texels.size(); ++k)
         for (const cv::Point& pixel : texels[k]) index.label(pixel) = static_cast<std::uint16_t>(k + 1);
@@ -78,7 +69,7 @@ IndexMap index_of(const std::vector<Pixels>& texels, cv::Size size) {
 }
 
 /// Sum of squared RGB distances to the mean.
-double scatter(const AlbedoMap& albedo, const Pixels& pixels) {
+double scatter(const AlbedoMap& albedo, const TexelPixels& pixels) {
     cv::Vec3d mean(0, 0, 0);
     for (const cv::Point& pixel : pixels) mean += cv::Vec3d(albedo.albedo(pixel));
     mean *= 1.0 / static_cast<double>(pixels.size());
@@ -88,6 +79,13 @@ double scatter(const AlbedoMap& albedo, const Pixels& pixels) {
         sum += difference.dot(difference);
     }
     return sum;
+}
+
+void require_few(std::size_t texels) {
+    constexpr std::size_t most = std::numeric_limits<std::uint16_t>::max();
+    if (texels > most)
+        throw InputError(fmt::format("there would be {} texels, but an index map holds {}", texels, most),
+                         "raise max_pixels or min_pixels, or ask for fewer clusters");
 }
 
 void require_pixels(const AlbedoMap& albedo) {
@@ -108,6 +106,12 @@ void TexelOptions::validate() const {
         throw InputError(fmt::format("texels: window is {}, but it must be odd (1...15)", window),
                          "set window to an odd number of pixels, such as 5");
     require_range("iterations", iterations, 1, 1000);
+    constexpr int most_pixels = std::numeric_limits<int>::max();
+    require_range("min_pixels", min_pixels, 1, most_pixels);
+    require_range("max_pixels", max_pixels, 0, most_pixels);
+    if (max_pixels > 0 && max_pixels < min_pixels)
+        throw InputError(fmt::format("texels: max_pixels is {}, less than min_pixels, {}", max_pixels, min_pixels),
+                         "set max_pixels to at least min_pixels, or to 0 for no limit");
     require_range("albedo_clusters x neighbourhood_clusters", albedo_clusters * neighbourhood_clusters, 1,
                   std::numeric_limits<std::uint16_t>::max());
 }
@@ -117,16 +121,20 @@ TexelResult cluster_texels(const AlbedoMap& albedo, const TexelOptions& options,
     options.validate();
     require_pixels(albedo);
     const AlbedoMap clean = without_non_finite(albedo);
-    const Pixels pixels = valid_pixels(clean);
+    const TexelPixels pixels = valid_pixels(clean);
     if (pixels.empty())
         throw InputError("the albedo map has no valid pixel", "check the mask: it must be white on the object");
 
-    const auto texels = on_threads_of(work, [&] { return texels_of(clean, pixels, options, work); });
+    const auto texels = on_threads_of(work, [&] {
+        auto found = without_large(clean, texels_of(clean, pixels, options, work), options);
+        return without_small(clean, std::move(found), options.min_pixels);
+    });
+    require_few(texels.size());
 
     TexelResult result;
     result.index = index_of(texels, albedo.albedo.size());
     double within = 0;
-    for (const Pixels& texel : texels) within += scatter(clean, texel);
+    for (const TexelPixels& texel : texels) within += scatter(clean, texel);
     const double total = scatter(clean, pixels);
     result.within_cluster_variance = within / static_cast<double>(pixels.size());
     result.variance_explained = total > 0 ? std::max(0.0, 1.0 - within / total) : 1.0;

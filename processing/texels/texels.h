@@ -12,6 +12,8 @@ struct TexelOptions {
     int neighbourhood_clusters = 8;  ///< k of the second step inside each albedo group, 1...256
     int window = 5;                  ///< side of the neighbourhood, pixels, odd, 1...15
     int iterations = 30;             ///< of each k-means, at most
+    int min_pixels = 1;              ///< a smaller texel joins the one most like it
+    int max_pixels = 0;              ///< a larger texel is parted by its neighbourhoods; 0 = no limit
     std::uint64_t seed = 1;
 
     /// Throws InputError that names the field and the allowed range.
@@ -26,8 +28,10 @@ struct TexelResult {
 };
 
 /// Two-step k-means of the unshaded image: by albedo, then inside each group by the neighbourhood vector (thesis, texel
-/// clustering). Seeded k-means++; no dead clusters; pixels outside the mask never enter a neighbourhood.
-/// Bit-identical on any number of threads. Throws InputError for an empty map.
+/// clustering). Seeded k-means++; no dead clusters; pixels outside the mask never enter a neighbourhood. Texels that
+/// are too large are parted by k-means of their own; then those too small join, smallest first, the texel of the
+/// nearest mean colour. Pixels that no window tells apart stay together, and an object of fewer than min_pixels is one
+/// texel. Bit-identical on any number of threads. Throws InputError for an empty map, and for more than 65535 texels.
 TexelResult cluster_texels(const AlbedoMap& albedo, const TexelOptions& options = {}, const WorkContext& work = {});
 
 }  // namespace darkbox

@@ -145,6 +145,11 @@ void add_texels_options(CLI::App& command, Arguments& a) {
         .add_option("--neighbourhood-clusters", texels.neighbourhood_clusters, "k of the second step, in each group")
         ->capture_default_str();
     command.add_option("--window", texels.window, "Side of the neighbourhood, pixels, odd")->capture_default_str();
+    command.add_option("--min-pixels", texels.min_pixels, "Smaller texels join the one most like them")
+        ->capture_default_str();
+    command.add_option("--max-pixels", texels.max_pixels, "Larger texels are parted; 0: no limit")
+        ->capture_default_str();
+    command.add_option("--seed", texels.seed, "Of the random choices")->capture_default_str();
 }
 
 void add_shade_options(CLI::App& command, Arguments& a) {

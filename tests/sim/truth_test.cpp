@@ -89,6 +89,9 @@ TEST(Truth, FilesHoldWhatWasTrue) {
         for (int u = 0; u < 64; ++u)
             ASSERT_EQ(mask(v, u), truth.mask[static_cast<std::size_t>(v * 64 + u)] != 0 ? 255 : 0);
 
+    const cv::Mat1w texels = cv::imread((path / "texels.png").string(), cv::IMREAD_UNCHANGED);
+    EXPECT_TRUE(std::equal(texels.begin(), texels.end(), truth.materials.begin(), truth.materials.end()));
+
     EXPECT_EQ(text_of(path / "lights.lp"),
               "3\nlamp-1 0.000000000 0.573462344 0.819231921\nlamp-2 0.573462344 0.000000000 0.819231921\n"
               "lamp-3 0.000000000 0.000000000 1.000000000\n");
@@ -102,6 +105,23 @@ TEST(Truth, FilesHoldWhatWasTrue) {
     EXPECT_NEAR(ball["radius"].get<double>(), 18.0 / 3.125, 1e-9);
     EXPECT_NEAR(ball["x"].get<double>(), 22.0 / 3.125 - 0.5, 1e-9);
     EXPECT_NEAR(ball["y"].get<double>(), 47.5 - 22.0 / 3.125, 1e-9);
+}
+
+TEST(Truth, MaterialsArePartedWhereTheColourIs) {
+    const Scene scene = SimRig::make(small_rig("torus-brick")).scene();
+    const SceneTruth truth = render_truth(scene);
+    double mortar = 0, brick = 0;  // redness
+    int mortar_pixels = 0, brick_pixels = 0;
+    for (std::size_t i = 0; i < truth.materials.size(); ++i) {
+        ASSERT_EQ(truth.materials[i] != 0, truth.mask[i] != 0);
+        if (truth.materials[i] == 0) continue;
+        const float* rgb = &truth.albedo.samples[3 * i];
+        (truth.materials[i] == 1 ? mortar : brick) += rgb[0] / rgb[2];
+        ++(truth.materials[i] == 1 ? mortar_pixels : brick_pixels);
+    }
+    ASSERT_GT(mortar_pixels, 50);
+    ASSERT_GT(brick_pixels, 500);
+    EXPECT_GT(brick / brick_pixels, 1.5 * mortar / mortar_pixels);
 }
 
 TEST(Truth, AFolderThatCannotBeMadeIsNamed) {

@@ -31,7 +31,7 @@ cv::Mat1f noise(int rows, int cols) {
 TEST(KMeans, FindsSeparateBlobs) {
     const std::vector<cv::Vec2f> truth{{0, 0}, {10, 0}, {0, 10}, {10, 10}, {5, 20}};
     const cv::Mat1f points = blobs(700, truth, 0.5F);
-    const KMeansResult result = kmeans(points, {5, 50, 1});
+    const KMeansResult result = kmeans(MatrixPoints(points), {5, 50, 1});
     ASSERT_EQ(result.centres.rows, 5);
     for (const cv::Vec2f& centre : truth) {
         double nearest = 1e9;
@@ -44,22 +44,23 @@ TEST(KMeans, FindsSeparateBlobs) {
 
 TEST(KMeans, InertiaIsTheSumOfSquaredDistances) {
     const cv::Mat1f points = (cv::Mat1f(4, 1) << 0, 2, 10, 14);
-    EXPECT_DOUBLE_EQ(kmeans(points, {2, 10, 1}).inertia, 1 + 1 + 4 + 4);
-    EXPECT_DOUBLE_EQ(kmeans(points, {4, 10, 1}).inertia, 0);
+    EXPECT_DOUBLE_EQ(kmeans(MatrixPoints(points), {2, 10, 1}).inertia, 1 + 1 + 4 + 4);
+    EXPECT_DOUBLE_EQ(kmeans(MatrixPoints(points), {4, 10, 1}).inertia, 0);
 }
 
 TEST(KMeans, EqualPointsMakeOneClusterEach) {
     cv::Mat1f points(3000, 3);
     for (int i = 0; i < points.rows; ++i) points.row(i).setTo(0.1F * static_cast<float>(i % 3) + 0.7F);
-    const KMeansResult result = kmeans(points, {8, 30, 1});
+    const KMeansResult result = kmeans(MatrixPoints(points), {8, 30, 1});
     EXPECT_EQ(result.centres.rows, 3);
     EXPECT_EQ(std::set<int>(result.label.begin(), result.label.end()).size(), 3U);
     EXPECT_LT(result.inertia, 1e-9);
 }
 
 TEST(KMeans, EveryClusterHasAPoint) {
+    const cv::Mat1f few = noise(60, 2);
     for (std::uint64_t seed = 0; seed < 40; ++seed) {
-        const KMeansResult result = kmeans(noise(60, 2), {50, 30, seed});
+        const KMeansResult result = kmeans(MatrixPoints(few), {50, 30, seed});
         EXPECT_EQ(std::set<int>(result.label.begin(), result.label.end()).size(), 50U);
     }
 }
@@ -69,7 +70,7 @@ TEST(KMeans, SameBitsOnAnyNumberOfThreads) {
     const auto on = [&](int threads) {
         WorkContext work;
         work.threads = threads;
-        return on_threads_of(work, [&] { return kmeans(points, {12, 20, 5}); });
+        return on_threads_of(work, [&] { return kmeans(MatrixPoints(points), {12, 20, 5}); });
     };
     const KMeansResult one = on(1);
     for (const int threads : {2, 8}) {
@@ -80,12 +81,44 @@ TEST(KMeans, SameBitsOnAnyNumberOfThreads) {
     }
 }
 
+TEST(KMeans, EveryPointIsAtItsNearestMeanWhenNothingChanges) {
+    // More points than the sample, run to the end: a wrong bound would leave a point at a centre that is not its
+    // nearest.
+    const cv::Mat1f points = noise(40000, 5);
+    const KMeansResult result = kmeans(MatrixPoints(points), {30, 1000, 2});
+    ASSERT_LT(result.iterations, 1000);
+    cv::Mat1d sums(result.centres.rows, 5, 0.0);
+    std::vector<int> count(result.centres.rows, 0);
+    for (int i = 0; i < points.rows; ++i) {
+        const double own = cv::norm(points.row(i), result.centres.row(result.label[i]));
+        for (int c = 0; c < result.centres.rows; ++c)
+            ASSERT_LE(own, cv::norm(points.row(i), result.centres.row(c)) + 1e-5);
+        for (int d = 0; d < 5; ++d) sums(result.label[i], d) += points(i, d);
+        ++count[result.label[i]];
+    }
+    for (int c = 0; c < result.centres.rows; ++c)
+        for (int d = 0; d < 5; ++d) EXPECT_NEAR(result.centres(c, d), sums(c, d) / count[c], 1e-5);
+}
+
+TEST(KMeans, FarFromTheOriginItIsAsGood) {
+    const cv::Mat1f points = noise(3000, 4);
+    const cv::Mat1f far(points + 1000.0F);
+    const double here = kmeans(MatrixPoints(points), {9, 30, 1}).inertia;
+    EXPECT_NEAR(kmeans(MatrixPoints(far), {9, 30, 1}).inertia / here, 1.0, 1e-3);
+}
+
+TEST(KMeans, FewDifferentPointsAmongManyAreAllFound) {
+    cv::Mat1f points(50000, 3, 0.25F);
+    for (int i = 0; i < 6; ++i) points.row(7000 * i + 13).setTo(static_cast<float>(i));
+    EXPECT_EQ(kmeans(MatrixPoints(points), {8, 30, 1}).centres.rows, 7);
+}
+
 /// Inertia over the same seeds, k and number of iterations: one run of k-means is a matter of luck.
 double mean_ratio_to_opencv(const cv::Mat1f& points) {
     double ours = 0;
     double theirs = 0;
     for (int seed = 1; seed <= 10; ++seed) {
-        ours += kmeans(points, {16, 30, static_cast<std::uint64_t>(seed)}).inertia;
+        ours += kmeans(MatrixPoints(points), {16, 30, static_cast<std::uint64_t>(seed)}).inertia;
         cv::setRNGSeed(seed);
         cv::Mat labels;
         theirs += cv::kmeans(points, 16, labels, {cv::TermCriteria::COUNT, 30, 0}, 1, cv::KMEANS_PP_CENTERS);

@@ -2,8 +2,10 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <opencv2/core.hpp>
 #include <set>
 
@@ -93,6 +95,57 @@ TEST(ClusterTexels, OnePixelIsOneTexel) {
     EXPECT_EQ(result.index.label(4, 4), 1);
 }
 
+std::vector<int> sizes_of(const IndexMap& index) {
+    std::vector<int> sizes(index.texels, 0);
+    for (const std::uint16_t label : index.label)
+        if (label != 0) ++sizes[label - 1];
+    return sizes;
+}
+
+TEST(ClusterTexels, SmallTexelsJoinAndLargeOnesArePartedWithinTheLimits) {
+    const AlbedoMap disc = textured_disc(120);
+    TexelOptions options;
+    options.min_pixels = 60;
+    options.max_pixels = 200;
+    const std::vector<int> free = sizes_of(cluster_texels(disc).index);
+    ASSERT_LT(*std::min_element(free.begin(), free.end()), 60);
+    ASSERT_GT(*std::max_element(free.begin(), free.end()), 200);
+    const TexelResult limited = cluster_texels(disc, options);
+    const std::vector<int> sizes = sizes_of(limited.index);
+    EXPECT_GE(*std::min_element(sizes.begin(), sizes.end()), 60);
+    EXPECT_EQ(std::accumulate(sizes.begin(), sizes.end(), 0), cv::countNonZero(disc.valid));
+    options.min_pixels = 1;
+    const std::vector<int> parted = sizes_of(cluster_texels(disc, options).index);
+    EXPECT_LE(*std::max_element(parted.begin(), parted.end()), 200);
+}
+
+TEST(ClusterTexels, ASmallTexelJoinsTheMostAlike) {
+    AlbedoMap map = filled({30, 10}, {0.1F, 0.1F, 0.1F});
+    map.albedo(cv::Rect(10, 0, 10, 10)).setTo(cv::Scalar::all(0.9));
+    map.albedo(cv::Rect(20, 0, 10, 10)).setTo(cv::Scalar(0.5, 0, 0));
+    map.albedo(5, 5) = {0.8F, 0.8F, 0.8F};
+    TexelOptions options;
+    options.albedo_clusters = 4;
+    options.neighbourhood_clusters = 1;
+    ASSERT_EQ(cluster_texels(map, options).index.texels, 4);
+    options.min_pixels = 2;
+    const IndexMap joined = cluster_texels(map, options).index;
+    EXPECT_EQ(joined.texels, 3);
+    EXPECT_EQ(joined.label(5, 5), joined.label(0, 15));
+}
+
+TEST(ClusterTexels, AnObjectBelowTheLimitIsOneTexel) {
+    TexelOptions options;
+    options.min_pixels = 100000;
+    EXPECT_EQ(cluster_texels(textured_disc(40), options).index.texels, 1);
+}
+
+TEST(ClusterTexels, EqualWindowsAreNotPartedWhateverTheLimit) {
+    TexelOptions options;
+    options.max_pixels = 10;
+    EXPECT_EQ(cluster_texels(filled({30, 20}, {0.5F, 0.4F, 0.3F}), options).index.texels, 1);
+}
+
 TEST(ClusterTexels, PixelsThatAreNotNumbersAreOutside) {
     AlbedoMap map = textured_disc(60);
     map.albedo(30, 30) = {0.5F, std::nanf(""), 0.5F};
@@ -162,6 +215,10 @@ TEST(TexelOptions, NameTheFieldAndItsRange) {
     TexelOptions none;
     none.albedo_clusters = 0;
     EXPECT_THAT(message(none), testing::HasSubstr("albedo_clusters is 0, allowed are 1...256"));
+    TexelOptions crossed;
+    crossed.min_pixels = 20;
+    crossed.max_pixels = 10;
+    EXPECT_THAT(message(crossed), testing::HasSubstr("max_pixels is 10, less than min_pixels, 20"));
     TexelOptions many;
     many.albedo_clusters = many.neighbourhood_clusters = 256;
     EXPECT_THAT(message(many), testing::HasSubstr("65536"));
