@@ -224,17 +224,17 @@ void read_directions_off(const RaysToLamps& rays, const std::vector<LocatedBall>
     calibration.method = "brightest";
 }
 
-void keep_light(const RefinedLight& refined, const Eigen::Vector3d& object, Light& light) {
+void keep_light(const RefinedLight& refined, Light& light) {
     light.direction = refined.direction;
     light.covariance = refined.covariance;
     light.used = true;
-    if (refined.position_mm) light.near = LampPosition{*refined.position_mm, object};
+    light.near = refined.near;
 }
 
 void keep_refined(const RefineResult& refined, const RefineInput& input, const std::vector<LocatedBall>& balls,
                   Calibration& calibration) {
     for (std::size_t i = 0; i < calibration.lights.size(); ++i)
-        if (refined.lights[i]) keep_light(*refined.lights[i], input.object_mm, calibration.lights[i]);
+        if (refined.lights[i]) keep_light(*refined.lights[i], calibration.lights[i]);
     for (std::size_t b = 0; b < refined.balls.size(); ++b) {
         const RefinedBall& ball = refined.balls[b];
         calibration.balls.push_back(outline_of(input.view, ball.sphere, balls[b].ball.confidence));

@@ -119,14 +119,10 @@ std::vector<std::size_t> judge_description(const Adjustment& adjustment, RefineI
 
 RefinedLight near_light(const Eigen::Vector3d& position, const Eigen::Matrix3d& covariance,
                         const Eigen::Vector3d& object) {
-    RefinedLight light;
-    const double distance = (position - object).norm();
-    light.direction = (position - object) / distance;
-    const Eigen::Matrix3d across =
-        (Eigen::Matrix3d::Identity() - light.direction * light.direction.transpose()) / distance;
-    light.covariance = across * covariance * across.transpose();
-    light.position_mm = position;
-    return light;
+    Light light;
+    light.near = LampPosition{position, object, covariance};
+    light = held_at(std::move(light), object);
+    return {light.direction, light.covariance, light.near};
 }
 
 std::vector<std::optional<RefinedLight>> lights_of(const RefineInput& input, Adjustment& adjustment) {

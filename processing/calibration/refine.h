@@ -34,7 +34,7 @@ struct RefineInput {
 struct RefinedLight {
     Eigen::Vector3d direction{0, 0, 1};
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< rad^2, rank two
-    std::optional<Eigen::Vector3d> position_mm;            ///< of a near lamp
+    std::optional<LampPosition> near;                      ///< of a near lamp
 };
 
 /// A highlight that does not fit the others.

@@ -132,6 +132,38 @@ void leave_out(Calibration& calibration, const std::vector<std::string>& dropped
     calibration.condition_number = condition_number(calibration.lights);
 }
 
+/// None where nothing stands out from the background: the picture's centre serves then.
+std::optional<cv::Point2d> centroid_without_balls(const Session& session, const BallFrames& ball,
+                                                  const Calibration& calibration, const WorkContext& work) {
+    try {
+        if (ball.separate) return centroid_of(load_mask(session, work));
+        std::vector<cv::Vec3d> discs;
+        for (const Ball& b : calibration.balls) discs.emplace_back(b.x, b.y, b.radius);
+        return centroid_of(automatic_mask(ball.frames, discs));
+    } catch (const InputError&) {
+        return std::nullopt;
+    }
+}
+
+/// Directions of near lamps hold at the object: where no mask says where that is, the photographs do, less the balls.
+void hold_at_object(const Session& session, const BallFrames& ball, Calibration& calibration, const WorkContext& work) {
+    const bool near =
+        std::any_of(calibration.lights.begin(), calibration.lights.end(), [](const Light& l) { return l.near; });
+    if (!near || !calibration.view) return;
+    const auto centroid = centroid_without_balls(session, ball, calibration, work);
+    if (!centroid) return;
+    for (Light& light : calibration.lights) light = held_at(std::move(light), calibration.view->point_at(*centroid));
+    calibration.condition_number = condition_number(calibration.lights);
+}
+
+std::optional<GreyCard> card_of(const CalibrateOptions& options) {
+    std::optional<GreyCard> card = options.grey_card;
+    if (!options.grey_card_mask) return card;
+    if (!card) card.emplace();
+    card->mask = read_mask(*options.grey_card_mask);
+    return card;
+}
+
 void append(std::vector<std::string>& to, std::vector<std::string> more) {
     to.insert(to.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
 }
@@ -166,12 +198,14 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
             with_geometry(session, with_imported(session, options), ball.frames.front().size());
         summary.calibration = calibrate(ball.frames, ball.files, wanted);
         require_highlights(summary.calibration, options.calibration.drop);
+        if (!wanted.object) hold_at_object(session, ball, summary.calibration, work);
+        append(summary.calibration.warnings, unused_geometry(session, wanted));
         summary.seconds.solve = watch.lap();
         const BallView view = view_of_balls(ball.frames, summary.calibration.balls);
         write_png(files.ball_picture, draw_balls(view, summary.calibration));
     }
     if (options.from || given) leave_out(summary.calibration, options.calibration.drop);
-    summary.calibration = with_measured_intensities(session, std::move(summary.calibration), options.grey_card, work);
+    summary.calibration = with_measured_intensities(session, std::move(summary.calibration), card_of(options), work);
     if (options.from || given) append(summary.calibration.warnings, warnings_about(summary.calibration));
     warn_of_few_lights(summary.calibration);
     if (const auto described = described_lights(session))
