@@ -12,6 +12,7 @@
 #include "processing/formats/light_files.h"
 #include "processing/formats/picture.h"
 #include "processing/formats/png.h"
+#include "processing/maps/parallel.h"
 #include "processing/pipeline/ball_picture.h"
 #include "processing/pipeline/given_lights.h"
 #include "processing/pipeline/intensities.h"
@@ -86,6 +87,19 @@ std::vector<Ball> read_balls(const fs::path& path) {
         for (const auto& ball : json.at("balls")) balls.push_back(ball_in(ball));
         return balls;
     });
+}
+
+/// Pixels of the object, of a part of the picture's rows where that is large.
+ObjectPixels pixels_of_object(const Session& session, const WorkContext& work) {
+    constexpr int rows_at_once = 64;
+    SessionPhotos photos(session);
+    const int height = photos.size().height;
+    PhotoBand band;
+    for (int row = 0; row < height; row += rows_at_once)
+        on_threads_of(work, [&] { photos.read_next(std::min(rows_at_once, height - row), band); });
+    ObjectPixels pixels = object_pixels(photos.kept_stack());
+    for (cv::Point2d& at : pixels.at) at.y *= photos.kept_row_step();
+    return pixels;
 }
 
 /// What was given at import holds unless the command says otherwise.
@@ -194,8 +208,8 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
         const BallFrames ball = load_ball_frames(session, work);
         summary.seconds.read = watch.lap();
         step(work, {"calibrating lights", 0, 1, "ball and highlights"});
-        const CalibrationOptions wanted =
-            with_geometry(session, with_imported(session, options), ball.frames.front().size());
+        CalibrationOptions wanted = with_geometry(session, with_imported(session, options), ball.frames.front().size());
+        if (options.photometric) wanted.object_pixels = pixels_of_object(session, work);
         summary.calibration = calibrate(ball.frames, ball.files, wanted);
         require_highlights(summary.calibration, options.calibration.drop);
         if (!wanted.object) hold_at_object(session, ball, summary.calibration, work);

@@ -112,6 +112,8 @@ void add_calibrate_options(CLI::App& command, Arguments& a) {
     command.add_option("--grey-card", a.grey_card,
                        "A diffuse grey card that faces the camera in the photographs, pixels: X,Y,WIDTH,HEIGHT");
     command.add_option("--grey-card-mask", a.grey_card_mask, "Picture that is white on the grey card, of any outline");
+    command.add_flag("--photometric", a.options.calibrate.photometric,
+                     "Refine the lights with the object's own diffuse pixels as well");
     command.add_option("--from", a.from, "Reuse the lights of this lights.json or session");
     const std::map<std::string, CalibrationMethod> methods{{"refined", CalibrationMethod::refined},
                                                            {"brightest", CalibrationMethod::brightest}};
