@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "processing/calibration/lambert_cost.h"
 #include "processing/calibration/residuals.h"
 
 namespace darkbox {
@@ -13,6 +14,7 @@ namespace {
 
 constexpr double cauchy_scale = 2.0;         ///< standard deviations
 constexpr double open_distance_sigma = 0.5;  ///< of the distance, where one ball must guess it
+constexpr double log_intensity_sigma = 0.5;  ///< lamps of one make differ by less
 
 ceres::LossFunction* loss_function(Loss loss) {
     return loss == Loss::robust ? new ceres::CauchyLoss(cauchy_scale) : nullptr;
@@ -28,6 +30,7 @@ Adjustment::Adjustment(const RefineInput& input, const std::vector<Believed>& be
     add_lamps(believed);
     for (std::size_t ball = 0; ball < spheres_.size(); ++ball) add_highlights(ball, believed[ball], loss);
     if (input.nominal) add_nominal(*input.nominal);
+    if (!input.object.empty()) add_object(input.object);
 }
 
 void Adjustment::add_ball(std::size_t i, const Believed& believed, Loss loss) {
@@ -58,7 +61,7 @@ void Adjustment::add_lamps(const std::vector<Believed>& believed) {
     for (std::size_t frame = 0; frame < lamps_.size(); ++frame) {
         std::size_t seen = 0;
         for (const Believed& ball : believed) seen += ball.highlight[frame] ? 1U : 0U;
-        if (seen == 0) continue;
+        if (seen == 0 && !input_.object.tells(frame)) continue;
         has_lamp_[frame] = 1;
         const Eigen::Vector3d& start = input_.start[frame];
         lamps_[frame] = {start.x(), start.y(), start.z()};
@@ -104,10 +107,45 @@ void Adjustment::add_nominal(const NominalLamps& nominal) {
     }
 }
 
+void Adjustment::add_object(const LambertSamples& object) {
+    using Prior = ceres::AutoDiffCostFunction<NumberPrior, 1, 1>;
+    const bool near = input_.lamps == LampModel::near;
+    log_intensities_.assign(lamps_.size(), 0.0);
+    for (std::size_t frame = 0; frame < lamps_.size(); ++frame) {
+        if (!has_lamp_[frame] || !object.tells(frame)) continue;
+        const double start = std::log(object.intensity[static_cast<Eigen::Index>(frame)]);
+        log_intensities_[frame] = start;
+        problem_.AddResidualBlock(new Prior(new NumberPrior{start, log_intensity_sigma}), nullptr,
+                                  &log_intensities_[frame]);
+    }
+    for (std::size_t pixel = 0; pixel < object.at.size(); ++pixel) {
+        std::vector<double> samples;
+        std::vector<double*> lamps, intensities;
+        double unit_mm = 0;
+        for (std::size_t frame = 0; frame < lamps_.size(); ++frame) {
+            const auto p = static_cast<Eigen::Index>(pixel), f = static_cast<Eigen::Index>(frame);
+            if (!has_lamp_[frame] || !object.tells(frame) || object.kept(p, f) == 0) continue;
+            samples.push_back(object.radiance(p, f));
+            lamps.push_back(lamps_[frame].data());
+            intensities.push_back(&log_intensities_[frame]);
+            unit_mm += (input_.start[frame] - input_.object_mm).norm();
+        }
+        if (samples.size() <= 3) continue;  // its normal takes up all that they say
+        const LambertCost::Geometry geometry{near, input_.view.point_at(object.at[pixel], input_.object_mm.z()),
+                                             unit_mm / static_cast<double>(samples.size())};
+        lamps.insert(lamps.end(), intensities.begin(), intensities.end());
+        problem_.AddResidualBlock(
+            new LambertCost(Eigen::Map<Eigen::VectorXd>(samples.data(), static_cast<Eigen::Index>(samples.size())),
+                            object.effective_sigma(), geometry),
+            nullptr, lamps);
+    }
+}
+
 bool Adjustment::solve() {
     ceres::Solver::Options options;
     options.num_threads = 1;
-    options.linear_solver_type = ceres::DENSE_SCHUR;
+    // The object ties all lamps together, so that nothing is left to eliminate.
+    options.linear_solver_type = input_.object.empty() ? ceres::DENSE_SCHUR : ceres::DENSE_NORMAL_CHOLESKY;
     options.max_num_iterations = 200;
     options.function_tolerance = 1e-14;
     options.parameter_tolerance = 1e-12;

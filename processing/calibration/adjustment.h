@@ -30,7 +30,7 @@ public:
     bool solve();
 
     MirrorSphere sphere(std::size_t ball) const;
-    /// Direction or position; no value for a frame without a believed highlight.
+    /// Direction or position; no value for a frame without a believed highlight, unless the object tells it.
     std::optional<Eigen::Vector3d> lamp(std::size_t frame) const;
     /// Signed distances of all of a ball's contour points to its outline, pixels.
     std::vector<double> contour_distances_px(std::size_t ball) const;
@@ -51,11 +51,13 @@ private:
     void add_lamps(const std::vector<Believed>& believed);
     void add_highlights(std::size_t ball, const Believed& believed, Loss loss);
     void add_nominal(const NominalLamps& nominal);
+    void add_object(const LambertSamples& object);
 
     const RefineInput& input_;
     std::vector<std::array<double, 4>> spheres_;
     std::vector<std::array<double, 3>> lamps_;  ///< one per frame
     std::vector<char> has_lamp_;
+    std::vector<double> log_intensities_;  ///< one per frame, with the object's samples alone
     std::array<double, 3> turn_{}, shift_{};
     std::vector<Shown> shown_;
     ceres::Problem problem_;

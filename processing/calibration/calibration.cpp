@@ -224,17 +224,17 @@ void read_directions_off(const RaysToLamps& rays, const std::vector<LocatedBall>
     calibration.method = "brightest";
 }
 
-void keep_light(const RefinedLight& refined, const Eigen::Vector3d& object, Light& light) {
+void keep_light(const RefinedLight& refined, Light& light) {
     light.direction = refined.direction;
     light.covariance = refined.covariance;
     light.used = true;
-    if (refined.position_mm) light.near = LampPosition{*refined.position_mm, object};
+    light.near = refined.near;
 }
 
 void keep_refined(const RefineResult& refined, const RefineInput& input, const std::vector<LocatedBall>& balls,
                   Calibration& calibration) {
     for (std::size_t i = 0; i < calibration.lights.size(); ++i)
-        if (refined.lights[i]) keep_light(*refined.lights[i], input.object_mm, calibration.lights[i]);
+        if (refined.lights[i]) keep_light(*refined.lights[i], calibration.lights[i]);
     for (std::size_t b = 0; b < refined.balls.size(); ++b) {
         const RefinedBall& ball = refined.balls[b];
         calibration.balls.push_back(outline_of(input.view, ball.sphere, balls[b].ball.confidence));
@@ -264,6 +264,31 @@ void keep_refined(const RefineResult& refined, const RefineInput& input, const s
     calibration.method = "refined";
 }
 
+/// From which the object's samples are judged; zero for frames whose lamp no ball shows.
+std::vector<Eigen::Vector3d> directions_at_object(const RaysToLamps& rays, const RefineInput& input) {
+    std::vector<Eigen::Vector3d> directions;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        const Eigen::Vector3d start =
+            input.lamps == LampModel::near ? Eigen::Vector3d(input.start[i] - input.object_mm) : input.start[i];
+        directions.push_back(rays[i].empty() ? Eigen::Vector3d(0, 0, 0) : start.normalized());
+    }
+    return directions;
+}
+
+/// Lamps that the object sees elsewhere than the ball does.
+void warn_of_disagreement(const RefineResult& refined, const RaysToLamps& rays, const RefineInput& input,
+                          Calibration& calibration) {
+    if (input.object.empty()) return;
+    for (const RejectedHighlight& r : refined.rejected) {
+        if (rays[r.frame].size() != 1 || !refined.lights[r.frame]) continue;
+        const double apart = angle_deg(rays[r.frame].front().direction, refined.lights[r.frame]->direction);
+        calibration.warnings.push_back(
+            fmt::format("the object's pixels see the lamp of {} {:.1f} degrees from where the ball has it, and are "
+                        "believed: it moved between the captures, or the surface is not matt",
+                        calibration.lights[r.frame].file, apart));
+    }
+}
+
 void refine_lights(const RaysToLamps& rays, RefineInput input, const std::vector<LocatedBall>& balls,
                    const CalibrationOptions& options, Calibration& calibration) {
     if (input.lamps == LampModel::near) {
@@ -275,11 +300,17 @@ void refine_lights(const RaysToLamps& rays, RefineInput input, const std::vector
         input.start = first_directions(rays);
         if (options.lamps == LampModel::distant) input.nominal = options.nominal;
     }
+    input.object = lambert_samples(options.object_pixels, directions_at_object(rays, input));
+    if (input.object.empty() && !options.object_pixels.empty())
+        calibration.warnings.push_back(
+            "the object's pixels do not follow Lambert's law under enough lamps, so that they say nothing of the "
+            "lights; they were left out");
     const RefineResult refined = refine(input);
     if (!refined.converged)
         throw InputError("the ball's outline and the lights could not be refined together",
                          "check the highlights, or choose the method `brightest`");
     keep_refined(refined, input, balls, calibration);
+    warn_of_disagreement(refined, rays, input, calibration);
     std::vector<MirrorSphere> spheres;
     for (const RefinedBall& ball : refined.balls) spheres.push_back(ball.sphere);
     warn_of_sizes(spheres, options, calibration);

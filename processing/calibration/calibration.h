@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "processing/calibration/photometric.h"
 #include "processing/maps/lights.h"
 #include "processing/maps/view.h"
 
@@ -72,6 +73,7 @@ struct CalibrationOptions {
     std::optional<double> ball_diameter_mm;  ///< of every ball; gives the scale where `view` is not known
     std::optional<NominalLamps> nominal;     ///< needed for near lamps off a single ball
     std::optional<cv::Point2d> object;       ///< pixel where directions are to hold; none: the picture's centre
+    ObjectPixels object_pixels;              ///< refined: these are to follow Lambert's law as well; empty: left out
 
     /// Throws InputError that names the field and the allowed range.
     void validate() const;

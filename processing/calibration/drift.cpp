@@ -69,6 +69,24 @@ std::vector<Match> matched(const RigLights& before, const RigLights& after, cons
     return matched_by_place(before, after);
 }
 
+/// A distant light's direction holds everywhere, a near lamp's at one point: only like can be compared, and near lamps
+/// as seen from the same point.
+RigLights seen_alike(const RigLights& before, RigLights after, const std::vector<Match>& matches) {
+    for (const Match& match : matches) {
+        const Light& a = before.lights[match.before];
+        Light& b = after.lights[match.after];
+        if (!a.used || !b.used) continue;
+        if (a.near.has_value() != b.near.has_value())
+            throw InputError(
+                fmt::format("the calibrations cannot be compared: one has {} as a near lamp, the other as a distant "
+                            "one, and their directions hold at different places",
+                            match.lamp),
+                "calibrate both with --lamps near, or both with --lamps distant");
+        if (a.near) b = held_at(std::move(b), a.near->object_mm);
+    }
+    return after;
+}
+
 /// The light's covariance, or what is assumed where it is not known.
 Eigen::Matrix3d covariance_of(const Light& light, const DriftOptions& options) {
     if (light.sigma_deg() > 0) return light.covariance;
@@ -232,7 +250,9 @@ void DriftOptions::validate() const {
 Drift drift_between(const RigLights& before, const RigLights& after, const DriftOptions& options) {
     options.validate();
     Drift drift;
-    Comparison c{before, after, options, matched(before, after, options, drift), {}, {}, std::nullopt};
+    std::vector<Match> matches = matched(before, after, options, drift);
+    const RigLights alike = seen_alike(before, after, matches);
+    Comparison c{before, alike, options, std::move(matches), {}, {}, std::nullopt};
     pair_directions(c);
     c.common = common_rotation(c.pairs);
     if (c.common) drift.knock = knock_of(*c.common, options.false_alarm);

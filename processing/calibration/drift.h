@@ -79,7 +79,8 @@ struct Drift {
 /// Compares two calibrations of one rig, lamp by lamp, matched by name. A common rotation is fitted robustly; where it
 /// is significant and a majority of lamps follow it, it is the camera's, and each lamp is judged by what remains
 /// against the rotation of the others. Errors of one ball turn all lamps together, so the rotation must exceed what
-/// one single lamp's uncertainty would explain. Throws InputError for calibrations of different rigs.
+/// one single lamp's uncertainty would explain. Near lamps are compared as the first calibration's object sees them.
+/// Throws InputError for calibrations of different rigs, and for a lamp that is near in one and distant in the other.
 Drift drift_between(const RigLights& before, const RigLights& after, const DriftOptions& options = {});
 
 }  // namespace darkbox

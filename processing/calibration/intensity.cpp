@@ -23,35 +23,49 @@ constexpr double noticeable_spread = 1.5;
 
 const char* remedy = "move the card, name another area, or leave that frame out";
 
-void require_in_picture(const GreyCard& card, cv::Size size) {
+/// 255 on the card.
+cv::Mat1b pixels_of(const GreyCard& card, cv::Size size) {
+    if (card.mask) {
+        if (card.mask->size() != size)
+            throw InputError(fmt::format("the grey card's mask is {}x{} pixels, the picture {}x{}", card.mask->cols,
+                                         card.mask->rows, size.width, size.height),
+                             "draw the mask on one of the photographs");
+        if (cv::countNonZero(*card.mask) == 0)
+            throw InputError("the grey card's mask is black", "make it white on the card");
+        return *card.mask;
+    }
     if ((card.area & cv::Rect({0, 0}, size)) != card.area)
         throw InputError(
             fmt::format("the grey card at {},{} of {}x{} pixels is not inside the picture of {}x{}", card.area.x,
                         card.area.y, card.area.width, card.area.height, size.width, size.height),
             "give the card's area as X,Y,WIDTH,HEIGHT in pixels");
+    cv::Mat1b pixels(size, uchar{0});
+    pixels(card.area).setTo(255);
+    return pixels;
 }
 
 /// Mean of n.L times fall-off over the card: what a light of intensity 1 would make of it, albedo aside.
-double expected(const Light& light, const GreyCard& card) {
+double expected(const Light& light, const GreyCard& card, const cv::Mat1b& pixels) {
     if (!light.near || !card.view) return std::max(0.0, card.normal.dot(light.direction));
     double sum = 0;
-    for (int y = card.area.y; y < card.area.y + card.area.height; ++y)
-        for (int x = card.area.x; x < card.area.x + card.area.width; ++x) {
+    for (int y = 0; y < pixels.rows; ++y)
+        for (int x = 0; x < pixels.cols; ++x) {
+            if (pixels(y, x) == 0) continue;
             const Incidence at = incidence(light, card.view->point_at(cv::Point2d(x, y), card.height_mm));
             sum += std::max(0.0, card.normal.dot(at.direction)) * at.falloff;
         }
-    return sum / card.area.area();
+    return sum / cv::countNonZero(pixels);
 }
 
-Eigen::Vector3d intensity_of(const cv::Mat3f& frame, const cv::Mat1b& clipped, const Light& light,
-                             const GreyCard& card) {
-    const double geometry = expected(light, card);
+Eigen::Vector3d intensity_of(const cv::Mat3f& frame, const cv::Mat1b& clipped, const Light& light, const GreyCard& card,
+                             const cv::Mat1b& pixels) {
+    const double geometry = expected(light, card, pixels);
     if (geometry < least_cosine)
         throw InputError(
             fmt::format("the light of {} hardly reaches the grey card: n.L is {:.2f}", light.file, geometry), remedy);
-    if (cv::countNonZero(clipped(card.area)) > most_clipped_share * card.area.area())
+    if (cv::countNonZero(clipped & pixels) > most_clipped_share * cv::countNonZero(pixels))
         throw InputError(fmt::format("the grey card is clipped in {}", light.file), "expose it less");
-    const cv::Scalar mean = cv::mean(frame(card.area));
+    const cv::Scalar mean = cv::mean(frame, pixels);
     const Eigen::Vector3d intensity = Eigen::Vector3d(mean[0], mean[1], mean[2]) / geometry;
     if (!(intensity.allFinite() && intensity.minCoeff() > 0))
         throw InputError(fmt::format("the grey card is dark in {}", light.file), remedy);
@@ -73,7 +87,7 @@ std::optional<IntensityOrigin> intensity_origin_from_name(const std::string& nam
 }
 
 void GreyCard::validate() const {
-    if (area.width < 1 || area.height < 1)
+    if (!mask && (area.width < 1 || area.height < 1))
         throw InputError(fmt::format("area is {}x{} pixels", area.width, area.height), "allowed: 1x1 or more");
     if (!(std::abs(normal.norm() - 1) < 1e-6))
         throw InputError(fmt::format("normal has the length {}", normal.norm()), "allowed: a unit vector");
@@ -87,8 +101,7 @@ Lights with_intensities_of_card(const std::vector<cv::Mat3f>& frames, const std:
                          "give one frame for each light");
     for (std::size_t i = 0; i < lights.size(); ++i) {
         if (!lights[i].used) continue;
-        require_in_picture(card, frames[i].size());
-        lights[i].intensity = intensity_of(frames[i], clipped[i], lights[i], card);
+        lights[i].intensity = intensity_of(frames[i], clipped[i], lights[i], card, pixels_of(card, frames[i].size()));
     }
     return with_mean_intensity_one(std::move(lights));
 }

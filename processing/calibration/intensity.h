@@ -17,6 +17,7 @@ std::optional<IntensityOrigin> intensity_origin_from_name(const std::string& nam
 /// A diffuse plane in the photographs.
 struct GreyCard {
     cv::Rect area;                     ///< pixels of the picture that show nothing else
+    std::optional<cv::Mat1b> mask;     ///< of the picture's size, 255 on such pixels; overrides `area`
     Eigen::Vector3d normal{0, 0, 1};   ///< unit, viewer frame
     std::optional<ViewGeometry> view;  ///< needed for near lights: where the card's pixels lie
     double height_mm = 0;              ///< of the card above z = 0, with `view`

@@ -42,8 +42,10 @@ std::vector<std::string> against_nominal(const RigLights& nominal, const RigLigh
     options.false_alarm = false_alarm;
     options.other_rig = OtherRig::compare;
     if (!difference(nominal.rig, calibration.rig).empty()) return {};
+    RigLights directions = calibration;  // at the object, as the description's are
+    for (Light& light : directions.lights) light.near.reset();
     std::vector<std::string> words;
-    for (const LampDrift& lamp : drift_between(nominal, calibration, options).lamps)
+    for (const LampDrift& lamp : drift_between(nominal, directions, options).lamps)
         if (lamp.finding == LampFinding::swapped || lamp.finding == LampFinding::duplicate ||
             lamp.finding == LampFinding::moved)
             words.push_back(in_words(lamp));

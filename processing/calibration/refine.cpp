@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "acquisition/frame/error.h"
 #include "processing/calibration/adjustment.h"
@@ -17,6 +18,8 @@ constexpr double least_contour_reject_px = 0.1;
 constexpr double least_highlight_reject_px = 0.5;  ///< nearer than this no highlight is called wrong
 constexpr double misplaced_slacks = 5;             ///< of NominalLamps::slack_mm
 constexpr int most_rounds = 5;
+constexpr int most_turns = 12;
+constexpr double tolerated_misfit = 1.5;
 
 void require_on_balls(const RefineInput& input) {
     for (const BallObservations& ball : input.balls)
@@ -91,6 +94,32 @@ void judge_highlights(const RefineInput& input, const Adjustment& adjustment, st
     }
 }
 
+/// The middle of the highlights' squared misfits over what it is where all errors are as large as believed.
+double middle_misfit(const RefineInput& input, const Adjustment& adjustment) {
+    std::vector<double> squares;
+    for (std::size_t ball = 0; ball < input.balls.size(); ++ball)
+        for (std::size_t frame = 0; frame < input.start.size(); ++frame)
+            if (const auto off = adjustment.highlight_off_px(ball, frame))
+                squares.push_back(std::pow(*off / input.balls[ball].highlights[frame]->sigma_px, 2));
+    if (squares.empty()) return 0;
+    const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+    std::nth_element(squares.begin(), middle, squares.end());
+    return *middle / (2 * std::numbers::ln2);  // the median of chi-squared with two degrees of freedom
+}
+
+/// No surface is quite Lambert's, and what it does otherwise is alike all over it. Where the object pulls most lamps
+/// off their highlights, its samples are believed less, until lamp and highlight agree in the middle: a lamp that the
+/// object then still sees elsewhere stands out.
+void believe_object_as_it_deserves(RefineInput& input, const std::vector<Believed>& believed) {
+    for (int turn = 0; turn < most_turns && !input.object.empty(); ++turn) {
+        Adjustment robust(input, believed, Loss::robust);
+        robust.solve();
+        const double misfit = middle_misfit(input, robust);
+        if (misfit < tolerated_misfit) return;
+        input.object.samples_per_independent *= std::max(2.0, misfit);
+    }
+}
+
 /// Whether the description pulled the lamp off everything that its frame shows.
 bool no_highlight_fits(const RefineInput& input, const Adjustment& adjustment, std::size_t frame) {
     std::size_t seen = 0, off = 0;
@@ -119,14 +148,10 @@ std::vector<std::size_t> judge_description(const Adjustment& adjustment, RefineI
 
 RefinedLight near_light(const Eigen::Vector3d& position, const Eigen::Matrix3d& covariance,
                         const Eigen::Vector3d& object) {
-    RefinedLight light;
-    const double distance = (position - object).norm();
-    light.direction = (position - object) / distance;
-    const Eigen::Matrix3d across =
-        (Eigen::Matrix3d::Identity() - light.direction * light.direction.transpose()) / distance;
-    light.covariance = across * covariance * across.transpose();
-    light.position_mm = position;
-    return light;
+    Light light;
+    light.near = LampPosition{position, object, covariance};
+    light = held_at(std::move(light), object);
+    return {light.direction, light.covariance, light.near};
 }
 
 std::vector<std::optional<RefinedLight>> lights_of(const RefineInput& input, Adjustment& adjustment) {
@@ -149,6 +174,7 @@ RefineResult refine(const RefineInput& input) {
     result.balls.resize(input.balls.size());
     RefineInput trusted = input;  // less what the highlights contradict
     std::vector<Believed> believed = all_of(input);
+    believe_object_as_it_deserves(trusted, believed);
     std::vector<std::size_t> misplaced;
     for (int round = 0; round < most_rounds; ++round) {
         Adjustment robust(trusted, believed, Loss::robust);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "processing/calibration/calibration.h"
+#include "processing/calibration/photometric.h"
 
 namespace darkbox {
 
@@ -29,12 +30,13 @@ struct RefineInput {
     std::vector<bool> distance_known;      ///< near: one per frame; false: only about what `start` says
     Eigen::Vector3d object_mm{0, 0, 0};    ///< where a near lamp's direction is to hold
     std::optional<NominalLamps> nominal;
+    LambertSamples object;  ///< empty: only the balls speak
 };
 
 struct RefinedLight {
     Eigen::Vector3d direction{0, 0, 1};
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< rad^2, rank two
-    std::optional<Eigen::Vector3d> position_mm;            ///< of a near lamp
+    std::optional<LampPosition> near;                      ///< of a near lamp
 };
 
 /// A highlight that does not fit the others.
@@ -68,7 +70,8 @@ struct RefineResult {
 };
 
 /// Spheres and lights together (Ceres, one thread): every contour point lies on its ball's outline, every highlight
-/// where the ball mirrors its lamp, the lamps about where the rig's description says. First with Cauchy's loss; what
+/// where the ball mirrors its lamp, the lamps about where the rig's description says, and the object's samples follow
+/// Lambert's law. First with Cauchy's loss; what
 /// then lies off by more than four standard deviations is left out, the contour's own scatter and the likeness of
 /// neighbouring points are taken from what remains, and plain least squares on that gives values and covariances: they
 /// hold the balls' uncertainty as well as the highlights'. Where a frame's highlights and the rig's description

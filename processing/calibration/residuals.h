@@ -129,6 +129,17 @@ struct VectorPrior {
     }
 };
 
+/// One number believed to be this.
+struct NumberPrior {
+    double value, sigma;
+
+    template <class T>
+    bool operator()(const T* x, T* residual) const {
+        residual[0] = (x[0] - value) / sigma;
+        return true;
+    }
+};
+
 /// A near lamp's distance from a point, believed roughly: without this a single ball leaves it open.
 struct DistancePrior {
     Eigen::Vector3d from;

@@ -1,6 +1,10 @@
 #include "processing/calibration/warnings.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <numeric>
 
 #include "processing/calibration/light_geometry.h"
 
@@ -25,17 +29,39 @@ void warn_of_lights_behind(const Lights& lights, std::vector<std::string>& warni
                 fmt::format("the light of {} lies behind the object: z must point to the viewer", light.file));
 }
 
-void warn_of_duplicates(const Lights& lights, std::vector<std::string>& warnings) {
-    for (std::size_t i = 0; i < lights.size(); ++i)
-        for (std::size_t j = i + 1; j < lights.size(); ++j) {
-            if (!lights[i].used || !lights[j].used) continue;
-            const double angle = angle_deg(lights[i].direction, lights[j].direction);
-            if (angle < same_direction_deg)
-                warnings.push_back(
-                    fmt::format("{} and {} were lit from the same direction within {:.2f} degrees: is one "
-                                "lamp named twice?",
-                                lights[i].file, lights[j].file, angle));
+/// Each used light's group, named by its first light: those that stand within `same_direction_deg` of one another,
+/// directly or by way of others.
+std::vector<std::size_t> groups_of(const Lights& lights) {
+    std::vector<std::size_t> group(lights.size());
+    std::iota(group.begin(), group.end(), std::size_t{0});
+    for (std::size_t j = 1; j < lights.size(); ++j)
+        for (std::size_t i = 0; i < j; ++i) {
+            if (!lights[i].used || !lights[j].used || group[i] == group[j]) continue;
+            if (angle_deg(lights[i].direction, lights[j].direction) >= same_direction_deg) continue;
+            const auto [first, second] = std::minmax(group[i], group[j]);
+            std::replace(group.begin(), group.end(), second, first);
         }
+    return group;
+}
+
+void warn_of_duplicates(const Lights& lights, std::vector<std::string>& warnings) {
+    const std::vector<std::size_t> group = groups_of(lights);
+    for (std::size_t first = 0; first < lights.size(); ++first) {
+        std::vector<std::string> files;
+        double widest = 0;
+        for (std::size_t i = first; i < lights.size(); ++i) {
+            if (group[i] != first) continue;
+            files.push_back(lights[i].file);
+            for (std::size_t j = first; j < i; ++j)
+                if (group[j] == first) widest = std::max(widest, angle_deg(lights[i].direction, lights[j].direction));
+        }
+        if (files.size() < 2) continue;
+        const std::string last = files.back();
+        files.pop_back();
+        warnings.push_back(
+            fmt::format("{} and {} were lit from the same direction within {:.2f} degrees: is one lamp named {}?",
+                        fmt::join(files, ", "), last, widest, files.size() == 1 ? "twice" : "several times"));
+    }
 }
 
 void warn_of_outline(const Calibration& calibration, std::vector<std::string>& warnings) {

@@ -62,6 +62,7 @@ ordered_json light_json(const Light& light, const std::string& lamp, const std::
     if (light.near) {
         j["position_mm"] = triple(light.near->position_mm);
         j["object_mm"] = triple(light.near->object_mm);
+        j["position_covariance_mm2"] = matrix_json(light.near->covariance_mm2);
     }
     return j;
 }
@@ -73,6 +74,7 @@ Light light_in(const json& j) {
     if (j.contains("covariance")) light.covariance = matrix_in(j.at("covariance"));
     if (j.contains("position_mm"))
         light.near = LampPosition{triple_in(j.at("position_mm")), triple_in(j.at("object_mm"))};
+    if (j.contains("position_covariance_mm2")) light.near->covariance_mm2 = matrix_in(j.at("position_covariance_mm2"));
     light.intensity = triple_in(j.at("intensity"));
     light.used = j.at("used").get<bool>();
     return light;

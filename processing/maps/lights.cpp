@@ -27,6 +27,20 @@ Incidence incidence(const Light& light, const Eigen::Vector3d& point_mm) {
     return {to_lamp / std::sqrt(squared), (light.near->position_mm - light.near->object_mm).squaredNorm() / squared};
 }
 
+Light held_at(Light light, const Eigen::Vector3d& object_mm) {
+    if (!light.near) return light;
+    const Incidence there = incidence(light, object_mm);
+    const double distance = (light.near->position_mm - object_mm).norm();
+    const Eigen::Matrix3d across =
+        (Eigen::Matrix3d::Identity() - there.direction * there.direction.transpose()) / distance;
+    light.direction = there.direction;
+    light.intensity *= there.falloff;
+    if (!light.near->covariance_mm2.isZero(0))
+        light.covariance = across * light.near->covariance_mm2 * across.transpose();
+    light.near->object_mm = object_mm;
+    return light;
+}
+
 Eigen::Matrix<double, Eigen::Dynamic, 3> direction_matrix(const Lights& lights) {
     const auto used = std::count_if(lights.begin(), lights.end(), [](const Light& l) { return l.used; });
     Eigen::Matrix<double, Eigen::Dynamic, 3> rows(used, 3);

@@ -11,6 +11,7 @@ namespace darkbox {
 struct LampPosition {
     Eigen::Vector3d position_mm{0, 0, 1000};
     Eigen::Vector3d object_mm{0, 0, 0};  ///< the point at which Light::direction and Light::intensity hold
+    Eigen::Matrix3d covariance_mm2 = Eigen::Matrix3d::Zero();  ///< of position_mm; zero = not known
 };
 
 /// A lamp's light as the object sees it. Viewer frame: x right, y up, z from the object to the camera.
@@ -35,6 +36,10 @@ struct Incidence {
 /// A distant light is the same everywhere; a near one falls off with the square of its distance, 1 at its object_mm.
 /// `point_mm` in the viewer frame.
 Incidence incidence(const Light& light, const Eigen::Vector3d& point_mm);
+
+/// The same lamp with its direction, covariance and intensity as they are at `object_mm`; a distant light as it is. A
+/// covariance is kept where the position's is not known.
+Light held_at(Light light, const Eigen::Vector3d& object_mm);
 
 /// Directions of the used lights as rows of an n x 3 matrix.
 Eigen::Matrix<double, Eigen::Dynamic, 3> direction_matrix(const Lights& lights);

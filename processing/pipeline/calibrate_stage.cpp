@@ -12,6 +12,7 @@
 #include "processing/formats/light_files.h"
 #include "processing/formats/picture.h"
 #include "processing/formats/png.h"
+#include "processing/maps/parallel.h"
 #include "processing/pipeline/ball_picture.h"
 #include "processing/pipeline/given_lights.h"
 #include "processing/pipeline/intensities.h"
@@ -88,6 +89,19 @@ std::vector<Ball> read_balls(const fs::path& path) {
     });
 }
 
+/// Pixels of the object, of a part of the picture's rows where that is large.
+ObjectPixels pixels_of_object(const Session& session, const WorkContext& work) {
+    constexpr int rows_at_once = 64;
+    SessionPhotos photos(session);
+    const int height = photos.size().height;
+    PhotoBand band;
+    for (int row = 0; row < height; row += rows_at_once)
+        on_threads_of(work, [&] { photos.read_next(std::min(rows_at_once, height - row), band); });
+    ObjectPixels pixels = object_pixels(photos.kept_stack());
+    for (cv::Point2d& at : pixels.at) at.y *= photos.kept_row_step();
+    return pixels;
+}
+
 /// What was given at import holds unless the command says otherwise.
 CalibrationOptions with_imported(const Session& session, const CalibrateOptions& asked) {
     CalibrationOptions options = asked.calibration;
@@ -132,6 +146,38 @@ void leave_out(Calibration& calibration, const std::vector<std::string>& dropped
     calibration.condition_number = condition_number(calibration.lights);
 }
 
+/// None where nothing stands out from the background: the picture's centre serves then.
+std::optional<cv::Point2d> centroid_without_balls(const Session& session, const BallFrames& ball,
+                                                  const Calibration& calibration, const WorkContext& work) {
+    try {
+        if (ball.separate) return centroid_of(load_mask(session, work));
+        std::vector<cv::Vec3d> discs;
+        for (const Ball& b : calibration.balls) discs.emplace_back(b.x, b.y, b.radius);
+        return centroid_of(automatic_mask(ball.frames, discs));
+    } catch (const InputError&) {
+        return std::nullopt;
+    }
+}
+
+/// Directions of near lamps hold at the object: where no mask says where that is, the photographs do, less the balls.
+void hold_at_object(const Session& session, const BallFrames& ball, Calibration& calibration, const WorkContext& work) {
+    const bool near =
+        std::any_of(calibration.lights.begin(), calibration.lights.end(), [](const Light& l) { return l.near; });
+    if (!near || !calibration.view) return;
+    const auto centroid = centroid_without_balls(session, ball, calibration, work);
+    if (!centroid) return;
+    for (Light& light : calibration.lights) light = held_at(std::move(light), calibration.view->point_at(*centroid));
+    calibration.condition_number = condition_number(calibration.lights);
+}
+
+std::optional<GreyCard> card_of(const CalibrateOptions& options) {
+    std::optional<GreyCard> card = options.grey_card;
+    if (!options.grey_card_mask) return card;
+    if (!card) card.emplace();
+    card->mask = read_mask(*options.grey_card_mask);
+    return card;
+}
+
 void append(std::vector<std::string>& to, std::vector<std::string> more) {
     to.insert(to.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
 }
@@ -162,16 +208,18 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
         const BallFrames ball = load_ball_frames(session, work);
         summary.seconds.read = watch.lap();
         step(work, {"calibrating lights", 0, 1, "ball and highlights"});
-        const CalibrationOptions wanted =
-            with_geometry(session, with_imported(session, options), ball.frames.front().size());
+        CalibrationOptions wanted = with_geometry(session, with_imported(session, options), ball.frames.front().size());
+        if (options.photometric) wanted.object_pixels = pixels_of_object(session, work);
         summary.calibration = calibrate(ball.frames, ball.files, wanted);
         require_highlights(summary.calibration, options.calibration.drop);
+        if (!wanted.object) hold_at_object(session, ball, summary.calibration, work);
+        append(summary.calibration.warnings, unused_geometry(session, wanted));
         summary.seconds.solve = watch.lap();
         const BallView view = view_of_balls(ball.frames, summary.calibration.balls);
         write_png(files.ball_picture, draw_balls(view, summary.calibration));
     }
     if (options.from || given) leave_out(summary.calibration, options.calibration.drop);
-    summary.calibration = with_measured_intensities(session, std::move(summary.calibration), options.grey_card, work);
+    summary.calibration = with_measured_intensities(session, std::move(summary.calibration), card_of(options), work);
     if (options.from || given) append(summary.calibration.warnings, warnings_about(summary.calibration));
     warn_of_few_lights(summary.calibration);
     if (const auto described = described_lights(session))

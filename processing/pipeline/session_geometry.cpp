@@ -1,5 +1,7 @@
 #include "processing/pipeline/session_geometry.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
@@ -51,6 +53,24 @@ CalibrationOptions with_geometry(const Session& session, CalibrationOptions opti
     return options;
 }
 
+std::vector<std::string> unused_geometry(const Session& session, const CalibrationOptions& options) {
+    const auto& geometry = session.info().geometry;
+    if (!geometry || options.view) return {};
+    std::vector<std::string> words;
+    const bool perspective = geometry->camera_distance_mm.has_value();
+    if (perspective)
+        words.push_back(
+            fmt::format("the camera stands {:.0f} mm from the object, but the scale of its pictures is not known, so "
+                        "that it was taken as orthographic: give mm_per_pixel in rig.toml",
+                        *geometry->camera_distance_mm));
+    if (options.nominal && options.lamps == LampModel::automatic && !options.ball_diameter_mm)
+        words.push_back(
+            "the rig's description has the lamps' places in millimetres, but the scale of the pictures is not known, "
+            "so that the lamps were taken as distant: give the ball's diameter (--ball-diameter MM) or mm_per_pixel in "
+            "rig.toml; if their light is parallel, say --lamps distant");
+    return words;
+}
+
 std::optional<RigLights> described_lights(const Session& session) {
     const auto& geometry = session.info().geometry;
     if (!geometry || geometry->lamps.empty()) return std::nullopt;
@@ -67,8 +87,11 @@ std::optional<RigLights> described_lights(const Session& session) {
 
 std::optional<cv::Point2d> object_centroid(const Session& session) {
     const auto path = extra_of(session, object_mask);
-    if (!path) return std::nullopt;
-    const cv::Moments moments = cv::moments(read_mask(*path), true);
+    return path ? centroid_of(read_mask(*path)) : std::nullopt;
+}
+
+std::optional<cv::Point2d> centroid_of(const cv::Mat1b& mask) {
+    const cv::Moments moments = cv::moments(mask, true);
     if (!(moments.m00 > 0)) return std::nullopt;
     return cv::Point2d(moments.m10 / moments.m00, moments.m01 / moments.m00);
 }

@@ -15,7 +15,11 @@ CalibrationOptions with_geometry(const Session& session, CalibrationOptions opti
 /// No value where the session does not know it.
 std::optional<RigLights> described_lights(const Session& session);
 
+/// What the session tells of camera and lamps but the calibration could not use, in words, with what would let it.
+std::vector<std::string> unused_geometry(const Session& session, const CalibrationOptions& options);
+
 /// Where the object's mask, if the session has one, has its centroid.
 std::optional<cv::Point2d> object_centroid(const Session& session);
+std::optional<cv::Point2d> centroid_of(const cv::Mat1b& mask);
 
 }  // namespace darkbox

@@ -40,6 +40,8 @@ public:
     /// Some of the rows read so far, in order, spread evenly over the picture: all of them for small pictures, else so
     /// many that all photographs together hold `most_kept_samples` pixels. For checks that need no more.
     const std::vector<PhotoRows>& kept_rows() const { return kept_; }
+    /// One row in so many is kept.
+    int kept_row_step() const { return keep_every_; }
     /// The mask of these rows; ask after the last band.
     cv::Mat1b kept_mask() const;
     /// Both as linear radiance.

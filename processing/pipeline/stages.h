@@ -33,16 +33,19 @@ struct CalibrateOptions {
     CalibrationOptions calibration;
     std::optional<std::filesystem::path> ball_mask;  ///< a picture that is white on the ball or balls
     std::optional<std::filesystem::path> from;  ///< a lights.json, or a session that has one: its lights are reused
+    bool photometric = false;  ///< the object's own diffuse pixels help to refine the lights
     std::optional<GreyCard> grey_card;          ///< in view in the lit frames: tells intensities
+    std::optional<std::filesystem::path> grey_card_mask;  ///< a picture that is white on it, instead of its area
 };
 struct CalibrateSummary {
     Calibration calibration;
     StageSeconds seconds;
 };
 /// Writes calibration/lights.json, lights.lp, ball.png. What the session knows of the rig's geometry serves where the
-/// options leave it open; directions of near lamps hold at the object's centroid (its mask's, where there is one, else
-/// the picture's centre). Intensities are measured where a grey card or flat frames allow. Lights that came with the
-/// pictures are taken as they are (method "given") unless a ball is given or `from` is set.
+/// options leave it open; directions of near lamps hold at the object's centroid (of its mask, which is found without
+/// the balls where none is given; else the picture's centre). Intensities are measured where a grey card or flat frames
+/// allow. Lights that came with the pictures are taken as they are (method "given") unless a ball is given or `from` is
+/// set.
 CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& options = {},
                                const WorkContext& work = {});
 

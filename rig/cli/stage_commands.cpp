@@ -19,6 +19,7 @@ struct Arguments {
     std::filesystem::path from;
     std::vector<std::string> highlights;
     std::string grey_card;
+    std::filesystem::path grey_card_mask;
 };
 
 /// The arguments as options, and those that need parsing parsed.
@@ -30,6 +31,7 @@ ProcessOptions options_of(const Arguments& arguments) {
     if (!arguments.from.empty()) options.calibrate.from = arguments.from;
     for (const std::string& text : arguments.highlights) calibration.highlights.push_back(parse_highlight(text));
     if (!arguments.grey_card.empty()) options.calibrate.grey_card = parse_grey_card(arguments.grey_card);
+    if (!arguments.grey_card_mask.empty()) options.calibrate.grey_card_mask = arguments.grey_card_mask;
     return options;
 }
 
@@ -109,6 +111,9 @@ void add_calibrate_options(CLI::App& command, Arguments& a) {
     command.add_option("--highlight", a.highlights, "A highlight read by hand: FRAME=X,Y");
     command.add_option("--grey-card", a.grey_card,
                        "A diffuse grey card that faces the camera in the photographs, pixels: X,Y,WIDTH,HEIGHT");
+    command.add_option("--grey-card-mask", a.grey_card_mask, "Picture that is white on the grey card, of any outline");
+    command.add_flag("--photometric", a.options.calibrate.photometric,
+                     "Refine the lights with the object's own diffuse pixels as well");
     command.add_option("--from", a.from, "Reuse the lights of this lights.json or session");
     const std::map<std::string, CalibrationMethod> methods{{"refined", CalibrationMethod::refined},
                                                            {"brightest", CalibrationMethod::brightest}};
@@ -127,7 +132,8 @@ void add_normals_options(CLI::App& command, Arguments& a) {
         .add_option("--memory-mib", a.options.normals.stereo.memory_mib,
                     "Memory for photographs and maps while solving")
         ->capture_default_str();
-    command.add_flag("!--no-surface", a.options.normals.surface, "Leave out height.exr and surface.ply");
+    command.add_flag_callback(
+        "--no-surface", [&a] { a.options.normals.surface = false; }, "Leave out height.exr and surface.ply");
     const std::map<std::string, IntensityChoice> choices{{"auto", IntensityChoice::automatic},
                                                          {"given", IntensityChoice::given},
                                                          {"estimate", IntensityChoice::estimate}};

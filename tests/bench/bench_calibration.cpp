@@ -17,8 +17,10 @@ struct Family {
     std::string name;
     Lamps lamps;
     bool perspective;
+    bool wall = true;
 };
 const std::vector<Family> families{{"distant, orthographic", Lamps::distant, false},
+                                   {"distant, in a room", Lamps::distant, false, false},
                                    {"distant, perspective", Lamps::distant, true},
                                    {"near, two balls", Lamps::near_two_balls, false},
                                    {"near, two balls, perspective", Lamps::near_two_balls, true},
@@ -43,6 +45,7 @@ SweepErrors sweep_family(const Family& family) {
         setting.lights = lights;
         setting.lamps = family.lamps;
         setting.perspective = family.perspective;
+        setting.wall = family.wall;
         setting.lamp_radiance = lamp_radiance;
         setting.captures = lights > 24 ? 1 : 3;
         const SweepErrors errors = sweep(setting);

@@ -56,6 +56,26 @@ TEST(Drift, LampsAreMatchedByNameNotByOrder) {
     EXPECT_THAT(found(drift_between(dome(12), after), LampFinding::moved), ElementsAre("lamp-5"));
 }
 
+RigLights standing_at(RigLights rig, double distance_mm) {
+    for (Light& light : rig.lights)
+        light.near = LampPosition{distance_mm * light.direction, {0, 0, 0}, 0.5 * Eigen::Matrix3d::Identity()};
+    return rig;
+}
+
+TEST(Drift, NearAndDistantCannotBeCompared) {
+    const std::string words = test::input_error_of([] { drift_between(dome(12), standing_at(dome(12), 400)); });
+    EXPECT_THAT(words, HasSubstr("lamp-1 as a near lamp"));
+}
+
+TEST(Drift, NearLampsAreComparedAsOneAndTheSameObjectSeesThem) {
+    RigLights before = standing_at(dome(12), 400), after = before;
+    for (Light& light : after.lights) light = held_at(light, {60, -30, 0});
+    EXPECT_GT(angle_deg(before.lights[0].direction, after.lights[0].direction), 5);
+    const Drift drift = drift_between(before, after);
+    EXPECT_TRUE(drift.steady());
+    EXPECT_NEAR(lamp_of(drift, "lamp-1").moved_deg, 0, 1e-6);
+}
+
 TEST(Drift, SwappedLampsAreNamedOnceAsAPair) {
     RigLights after = dome(12);
     test::swap_lamps(after, 2, 7);

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <opencv2/imgproc.hpp>
+
 #include "tests/processing/calibration/drift_scene.h"
 #include "tests/support/throws.h"
 
@@ -77,6 +79,20 @@ TEST(GreyCard, DividesTheFallOffOfNearLightsOut) {
     card.view = ViewGeometry{3.0, {30, 20}};
     const CardScene scene = card_under(truth, card);
     expect_intensities(with_intensities_of_card(scene.frames, scene.clipped, scene.lights, card), truth);
+}
+
+TEST(GreyCard, MayHaveAnyOutline) {
+    const Lights truth = uneven_dome(9);
+    CardScene scene = card_under(truth, card_at({10, 10, 20, 15}));
+    GreyCard card;
+    card.mask = cv::Mat1b(40, 60, uchar{0});
+    cv::circle(*card.mask, {20, 17}, 6, cv::Scalar(255), cv::FILLED);
+    for (cv::Mat3f& frame : scene.frames) frame(cv::Rect(10, 10, 3, 3)).setTo(cv::Scalar(1, 1, 1));  // beside it
+    expect_intensities(with_intensities_of_card(scene.frames, scene.clipped, scene.lights, card), truth);
+    card.mask = cv::Mat1b(41, 60, uchar{255});
+    EXPECT_THAT(
+        test::input_error_of([&] { with_intensities_of_card(scene.frames, scene.clipped, scene.lights, card); }),
+        HasSubstr("mask is 60x41"));
 }
 
 TEST(GreyCard, WhatItCannotTellIsAnError) {

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "processing/calibration/warnings.h"
 #include "tests/processing/calibration/drift_scene.h"
 
 namespace darkbox {
@@ -18,6 +19,12 @@ RigLights described(int lamps) { return dome(lamps, 0); }
 TEST(AgainstNominal, ARigBuiltToItsDescriptionIsFine) {
     std::mt19937 random(3);
     EXPECT_THAT(against_nominal(described(12), test::measured(dome(12, 2.0), random)), IsEmpty());
+}
+
+TEST(AgainstNominal, NearLampsAreSeenFromTheObjectAsDescribed) {
+    RigLights read = dome(12);
+    for (Light& light : read.lights) light.near = LampPosition{400 * light.direction, {0, 0, 0}};
+    EXPECT_THAT(against_nominal(described(12), read), IsEmpty());
 }
 
 TEST(AgainstNominal, SwappedLampsAreNamed) {
@@ -45,6 +52,16 @@ TEST(AgainstNominal, AnotherRigsDescriptionSaysNothing) {
     other.rig.name = "arch";
     test::swap_lamps(other, 2, 7);
     EXPECT_THAT(against_nominal(other, dome(12)), IsEmpty());
+}
+
+TEST(Warnings, LampsInOnePlaceAreNamedInOneSentence) {
+    Calibration calibration;
+    calibration.lights = dome(9).lights;
+    for (const std::size_t lamp : {4U, 6U, 8U}) calibration.lights[lamp].direction = calibration.lights[1].direction;
+    calibration.lights[7].direction = calibration.lights[2].direction;
+    EXPECT_THAT(warnings_about(calibration),
+                ElementsAre(HasSubstr("frame-2.png, frame-5.png, frame-7.png and frame-9.png were lit from the same"),
+                            HasSubstr("frame-3.png and frame-8.png were lit from the same")));
 }
 
 TEST(WeakLamps, AreDimOrDeadBesideTheMedian) {

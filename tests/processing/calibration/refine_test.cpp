@@ -166,7 +166,7 @@ void expect_exact(const Truth& truth) {
     for (std::size_t i = 0; i < lamps.size(); ++i) {
         EXPECT_LT(angle_deg(result.lights[i]->direction, truth.direction(lamps[i])), 1e-3);
         if (truth.lamps == LampModel::near) {
-            EXPECT_LT((result.lights[i]->position_mm.value() - lamps[i]).norm(), 0.1);
+            EXPECT_LT((result.lights[i]->near.value().position_mm - lamps[i]).norm(), 0.1);
         }
     }
 }
@@ -216,7 +216,7 @@ TEST(Refine, OneBallAndTheRigsGeometryTellNearLamps) {
             rig_from_viewer * lamp + 5 * Eigen::Vector3d(random.next(), random.next(), random.next()));
     const RefineResult result = refine(input);
     for (std::size_t i = 0; i < lamps.size(); ++i) {
-        EXPECT_LT((result.lights[i]->position_mm.value() - lamps[i]).norm(), 20);
+        EXPECT_LT((result.lights[i]->near.value().position_mm - lamps[i]).norm(), 20);
         EXPECT_LT(angle_deg(result.lights[i]->direction, truth.direction(lamps[i])), 0.15);
     }
 }

@@ -40,6 +40,17 @@ TEST(Incidence, ANearLightFallsOffWithTheSquareOfItsDistance) {
     EXPECT_TRUE(at.direction.isApprox(Eigen::Vector3d(0, 0, 1)));
 }
 
+TEST(HeldAt, ALampIsSeenFromElsewhereAndItsCovarianceFollows) {
+    Light light;
+    light.near = LampPosition{{0, 0, 1000}, {0, 0, 0}, 4 * Eigen::Matrix3d::Identity()};
+    const Light there = held_at(light, {0, 600, 200});
+    EXPECT_TRUE(there.direction.isApprox(Eigen::Vector3d(0, -0.6, 0.8)));
+    EXPECT_TRUE(there.intensity.isApprox(Eigen::Vector3d::Ones()));  // as far away as before
+    EXPECT_NEAR(there.sigma_deg(), 2 / 1000.0 * 180 / M_PI, 1e-9);
+    EXPECT_NEAR((there.covariance * there.direction).norm(), 0, 1e-15);
+    EXPECT_EQ(held_at(Light{}, {1, 2, 3}).direction, Light{}.direction);
+}
+
 TEST(Incidence, ADistantLightIsTheSameEverywhere) {
     Light light;
     light.direction = Eigen::Vector3d(1, 2, 3).normalized();

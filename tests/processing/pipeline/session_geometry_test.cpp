@@ -10,7 +10,10 @@
 namespace darkbox {
 namespace {
 
+using testing::AllOf;
 using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
 
 /// One grey frame for each of these lamps.
 Session session_of(const test::TemporaryFolder& folder, const std::optional<CaptureGeometry>& geometry,
@@ -67,6 +70,27 @@ TEST(SessionGeometry, YieldsToTheOptionsAndToParallelLight) {
     EXPECT_EQ(options.ball_diameter_mm, 20);
     EXPECT_EQ(options.lamps, LampModel::distant);
     EXPECT_FALSE(options.nominal);
+}
+
+TEST(UnusedGeometry, IsToldWithWhatWouldLetItBeUsed) {
+    const test::TemporaryFolder folder;
+    CaptureGeometry geometry = two_lamps();
+    geometry.mm_per_pixel.reset();
+    geometry.ball_diameter_mm.reset();
+    const Session session = session_of(folder, geometry, {"left", "top"});
+    const CalibrationOptions options = with_geometry(session, {}, {40, 30});
+    EXPECT_THAT(unused_geometry(session, options),
+                ElementsAre(AllOf(HasSubstr("taken as orthographic"), HasSubstr("mm_per_pixel")),
+                            AllOf(HasSubstr("taken as distant"), HasSubstr("--ball-diameter"))));
+    CalibrationOptions told = options;
+    told.lamps = LampModel::distant;
+    EXPECT_THAT(unused_geometry(session, told), ElementsAre(HasSubstr("orthographic")));
+}
+
+TEST(UnusedGeometry, IsNoneWhereTheScaleIsKnown) {
+    const test::TemporaryFolder folder;
+    const Session session = session_of(folder, two_lamps(), {"left", "top"});
+    EXPECT_THAT(unused_geometry(session, with_geometry(session, {}, {40, 30})), IsEmpty());
 }
 
 TEST(DescribedLights, AreTheDirectionsOfTheDescribedLamps) {
