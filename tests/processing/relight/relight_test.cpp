@@ -109,6 +109,7 @@ TEST(Relight, PhongHighlightSitsHalfWayToTheLight) {
         for (int level = 0; level < scene.shading.levels; ++level)
             scene.shading.radiance(k, level) = cv::Vec3f::all(0.1F * static_cast<float>(level));
     RelightOptions options = phong();
+    options.phong_diffuse = 0;
     options.phong_specular = 1;
     options.phong_exponent = 100;
     const Light light = light_from(0.6, 0, 0.8);
