@@ -127,8 +127,8 @@ struct Reflection {
 
     Vector n_dot_l(const PixelBlock& block, std::size_t i) const {
         const Floats d;
-        return hn::Add(hn::Add(hn::Mul(hn::Load(d, block.normal[0] + i), x), hn::Mul(hn::Load(d, block.normal[1] + i), y)),
-                       hn::Mul(hn::Load(d, block.normal[2] + i), z));
+        const Vector xy = hn::MulAdd(hn::Load(d, block.normal[0] + i), x, hn::Mul(hn::Load(d, block.normal[1] + i), y));
+        return hn::MulAdd(hn::Load(d, block.normal[2] + i), z, xy);
     }
 
     /// 0 where the light is behind the surface.
@@ -309,21 +309,21 @@ void finish(const Frame& frame, const PixelBlock& block, const Received& receive
 
 /// 255 times the sRGB curve of 0...1: the line near black, elsewhere a polynomial of the square root that is 0.09 levels
 /// off at most (minimax over 0.0031308...1).
-inline Vector srgb_level(Vector linear) {
+HWY_INLINE Vector srgb_level(Vector linear) {
     const Vector root = hn::Sqrt(linear);
     constexpr double coefficients[] = {0.51730531,  -1.62366346, 2.03157759,
                                        -1.40273654, 1.51795065,  -0.04010959};
     Vector curve = set(255 * coefficients[0]);
-    for (int i = 1; i < 6; ++i) curve = hn::Add(hn::Mul(curve, root), set(255 * coefficients[i]));
+    for (int i = 1; i < 6; ++i) curve = hn::MulAdd(curve, root, set(255 * coefficients[i]));
     return hn::IfThenElse(hn::Le(linear, set(0.0031308)), hn::Mul(linear, set(255 * 12.92)), curve);
 }
 
 template <Encoding encoding>
-auto level_of(Vector linear) {
+HWY_INLINE auto level_of(Vector linear) {
     const hn::Rebind<std::uint8_t, Floats> bytes;
     const Vector cut = hn::Clamp(linear, zero(), set(1));
     const Vector level = encoding == Encoding::srgb ? srgb_level(cut) : hn::Mul(cut, set(255));
-    return hn::DemoteTo(bytes, hn::ConvertTo(Integers(), hn::Add(level, set(0.5))));
+    return hn::DemoteTo(bytes, hn::NearestInt(level));
 }
 
 template <Encoding encoding>
