@@ -106,6 +106,10 @@ struct alignas(64) Positions {
     float factor[block_pixels];        ///< on what is found; 1 but for OutOfRange::scale
 };
 
+inline hn::Mask<Floats> inside(const PixelBlock& block, std::size_t i) {
+    return hn::RebindMask(Floats(), hn::Gt(hn::Load(Integers(), block.texel + i), hn::Zero(Integers())));
+}
+
 inline void put_position(const Frame& frame, const PixelBlock& block, Vector r, std::size_t i, Positions& to) {
     const Floats d;
     const Vector last = set(frame.levels - 1);
@@ -167,9 +171,8 @@ void locate(const Frame& frame, const PixelBlock& block, const DistantLight& lig
             return for_vectors([&](std::size_t i) {
                 const Vector cosine = reflection.n_dot_l(block, i);
                 put_position(frame, block, cosine, i, positions);
-                const auto inside = hn::RebindMask(d, hn::Gt(hn::Load(Integers(), block.texel + i), hn::Zero(Integers())));
                 const Vector highlight =
-                    hn::IfThenElseZero(inside, hn::Mul(specular, reflection.highlight(block, cosine, i)));
+                    hn::IfThenElseZero(inside(block, i), hn::Mul(specular, reflection.highlight(block, cosine, i)));
                 for (int c = 0; c < 3; ++c) {
                     float* to = received.mirrored[c] + i;
                     const Vector more = hn::Mul(set(colour[c] * light.intensity[c]), highlight);
@@ -263,9 +266,12 @@ void receive_from_environment(const FoldedEnvironment& environment, const PixelB
     if (!environment.mirrored().empty()) {
         look_up_cells(environment.mirrored().data(), nodes, 1, cells, [](std::size_t) { return std::size_t{0}; },
                       received.through_shading);
-        for (std::size_t p = 0; p < block_pixels; ++p)
-            for (std::size_t c = 0; c < 3; ++c)
-                received.mirrored[c][p] = block.texel[p] > 0 ? received.through_shading[4 * p + c] : 0.0F;
+        for_vectors([&](std::size_t i) {
+            Vector rgb[3], spare;
+            hn::LoadInterleaved4(Floats(), received.through_shading + 4 * i, rgb[0], rgb[1], rgb[2], spare);
+            for (int c = 0; c < 3; ++c)
+                hn::Store(hn::IfThenElseZero(inside(block, i), rgb[c]), Floats(), received.mirrored[c] + i);
+        });
     }
     look_up_cells(environment.shading(), nodes, environment.texels() + 1, cells,
                   [&](std::size_t p) { return static_cast<std::size_t>(block.texel[p]); }, received.through_shading);
@@ -320,10 +326,12 @@ HWY_INLINE Vector srgb_level(Vector linear) {
 
 template <Encoding encoding>
 HWY_INLINE auto level_of(Vector linear) {
+    const hn::RebindToUnsigned<Floats> words;
     const hn::Rebind<std::uint8_t, Floats> bytes;
     const Vector cut = hn::Clamp(linear, zero(), set(1));
     const Vector level = encoding == Encoding::srgb ? srgb_level(cut) : hn::Mul(cut, set(255));
-    return hn::DemoteTo(bytes, hn::NearestInt(level));
+    // At 2^23 a float has no room for fractions: the addition rounds, and leaves the integer in the lowest bits.
+    return hn::TruncateTo(bytes, hn::BitCast(words, hn::Add(level, set(8388608))));
 }
 
 template <Encoding encoding>
