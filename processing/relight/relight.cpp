@@ -24,7 +24,7 @@ void RelightOptions::validate() const {
     require_range("phong_exponent", phong_exponent, 1, 1000);
     for (int c = 0; c < 3; ++c) require_range("specular_colour", specular_colour[c], 0, 1);
     require_range("environment_yaw", environment_yaw, -1000, 1000);
-    require_range("exposure", exposure, 0, 1e6);
+    require_range("exposure", exposure, 0, 1e9);
 }
 
 RelightResult relight(const RelightScene& scene, const Lights& lights, const RelightOptions& options,
@@ -50,14 +50,6 @@ RelightResult relight(const RelightScene& scene, const Environment& environment,
     relighter.render(folded, options, result.image, work);
     result.render_seconds = rendering.seconds();
     return result;
-}
-
-cv::Mat3f at_constant_coefficient(const RelightScene& scene, double r, const RelightOptions& options,
-                                  const WorkContext& work) {
-    const Relighter relighter(scene, work);
-    cv::Mat3f image(relighter.size());
-    relighter.render_constant(r, options, image, work);
-    return image;
 }
 
 }  // namespace darkbox

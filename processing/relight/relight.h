@@ -33,7 +33,7 @@ struct RelightOptions {
     double phong_exponent = 20.0;            ///< n, 1...1000
     cv::Vec3d specular_colour = {1, 1, 1};   ///< phong_split: radiance of a whole highlight, light of intensity 1; 0...1
     double environment_yaw = 0.0;  ///< radians; right-handed about +y: what stood behind the object moves to the left
-    double exposure = 1.0;         ///< factor on the result, 0...1e6
+    double exposure = 1.0;         ///< factor on the result, 0...1e9
 
     /// Throws InputError that names the field and the allowed range.
     void validate() const;
@@ -55,6 +55,12 @@ struct Environment {
     cv::Mat3f radiance;
 };
 
+/// The same coefficient r in every pixel, for a light of intensity 1: a stack over r shows how a texture changes from dark
+/// to bright (thesis, the pseudo-BTF figure).
+struct ConstantCoefficient {
+    double r;  ///< 0...1
+};
+
 struct RelightResult {
     cv::Mat3f image;            ///< linear radiance; 0 outside the object
     double fold_seconds = 0;    ///< environment: building its table
@@ -73,10 +79,5 @@ RelightResult relight(const RelightScene& scene, const Lights& lights, const Rel
 /// Under an environment, see FoldedEnvironment. Throws InputError for a probe that is empty, negative or not finite.
 RelightResult relight(const RelightScene& scene, const Environment& environment, const RelightOptions& options = {},
                       const WorkContext& work = {});
-
-/// The object with the same coefficient r, 0...1, in every pixel: a stack over r shows how its texture changes from
-/// dark to bright (thesis, the pseudo-BTF figure). Throws InputError as relight() does.
-cv::Mat3f at_constant_coefficient(const RelightScene& scene, double r, const RelightOptions& options = {},
-                                  const WorkContext& work = {});
 
 }  // namespace darkbox

@@ -1,11 +1,13 @@
 #include "processing/relight/relighter.h"
 
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "acquisition/frame/error.h"
 #include "processing/maps/parallel.h"
 #include "processing/maps/require.h"
 #include "processing/relight/scene_checks.h"
@@ -112,6 +114,13 @@ std::vector<DistantLight> used_lights(const Lights& lights) {
     return used;
 }
 
+void require_same_texels(const FoldedEnvironment& environment, int texels) {
+    if (environment.texels() != texels)
+        throw InputError(fmt::format("the environment was folded for {} texels, but the object has {}",
+                                     environment.texels(), texels),
+                         "fold it for this object");
+}
+
 /// Puts blocks one after the other into a row and black between them.
 template <class Channel>
 class RowWriter {
@@ -152,6 +161,23 @@ struct Relighter::Prepared {
     Frame frame(const RelightOptions& options) const {
         options.validate();
         return {.shading = table.data(), .levels = scene.shading.levels, .options = options};
+    }
+    Frame frame(const Lights& lights, const RelightOptions& options) const {
+        Frame result = frame(options);
+        result.lights = used_lights(lights);
+        return result;
+    }
+    Frame frame(const FoldedEnvironment& environment, const RelightOptions& options) const {
+        require_same_texels(environment, scene.index.texels);
+        Frame result = frame(options);
+        result.environment = &environment;
+        return result;
+    }
+    Frame frame(ConstantCoefficient coefficient, const RelightOptions& options) const {
+        require_range("the coefficient r", coefficient.r, 0, 1);
+        Frame result = frame(options);
+        result.constant_r = static_cast<float>(coefficient.r);
+        return result;
     }
 
     void render(const Frame& frame, cv::Mat3f& into, const WorkContext& work) const {
@@ -195,20 +221,6 @@ Relighter::~Relighter() = default;
 
 cv::Size Relighter::size() const { return prepared_->size(); }
 
-void Relighter::render(const Lights& lights, const RelightOptions& options, cv::Mat3f& into,
-                       const WorkContext& work) const {
-    Frame frame = prepared_->frame(options);
-    frame.lights = used_lights(lights);
-    prepared_->render(frame, into, work);
-}
-
-void Relighter::render(const Lights& lights, const RelightOptions& options, Encoding encoding, cv::Mat3b& into,
-                       const WorkContext& work) const {
-    Frame frame = prepared_->frame(options);
-    frame.lights = used_lights(lights);
-    prepared_->render(frame, encoding, into, work);
-}
-
 FoldedEnvironment Relighter::fold(const Environment& environment, const RelightOptions& options,
                                   const WorkContext& work) const {
     options.validate();
@@ -218,26 +230,34 @@ FoldedEnvironment Relighter::fold(const Environment& environment, const RelightO
     });
 }
 
+void Relighter::render(const Lights& lights, const RelightOptions& options, cv::Mat3f& into,
+                       const WorkContext& work) const {
+    prepared_->render(prepared_->frame(lights, options), into, work);
+}
+
+void Relighter::render(const Lights& lights, const RelightOptions& options, Encoding encoding, cv::Mat3b& into,
+                       const WorkContext& work) const {
+    prepared_->render(prepared_->frame(lights, options), encoding, into, work);
+}
+
 void Relighter::render(const FoldedEnvironment& environment, const RelightOptions& options, cv::Mat3f& into,
                        const WorkContext& work) const {
-    Frame frame = prepared_->frame(options);
-    frame.environment = &environment;
-    prepared_->render(frame, into, work);
+    prepared_->render(prepared_->frame(environment, options), into, work);
 }
 
 void Relighter::render(const FoldedEnvironment& environment, const RelightOptions& options, Encoding encoding,
                        cv::Mat3b& into, const WorkContext& work) const {
-    Frame frame = prepared_->frame(options);
-    frame.environment = &environment;
-    prepared_->render(frame, encoding, into, work);
+    prepared_->render(prepared_->frame(environment, options), encoding, into, work);
 }
 
-void Relighter::render_constant(double r, const RelightOptions& options, cv::Mat3f& into,
-                                const WorkContext& work) const {
-    require_range("the coefficient r", r, 0, 1);
-    Frame frame = prepared_->frame(options);
-    frame.constant_r = static_cast<float>(r);
-    prepared_->render(frame, into, work);
+void Relighter::render(ConstantCoefficient coefficient, const RelightOptions& options, cv::Mat3f& into,
+                       const WorkContext& work) const {
+    prepared_->render(prepared_->frame(coefficient, options), into, work);
+}
+
+void Relighter::render(ConstantCoefficient coefficient, const RelightOptions& options, Encoding encoding,
+                       cv::Mat3b& into, const WorkContext& work) const {
+    prepared_->render(prepared_->frame(coefficient, options), encoding, into, work);
 }
 
 }  // namespace darkbox

@@ -49,8 +49,10 @@ public:
     void render(const FoldedEnvironment& environment, const RelightOptions& options, Encoding encoding,
                 cv::Mat3b& into, const WorkContext& work = {}) const;
 
-    /// The same coefficient r, 0...1, in every pixel.
-    void render_constant(double r, const RelightOptions& options, cv::Mat3f& into, const WorkContext& work = {}) const;
+    void render(ConstantCoefficient coefficient, const RelightOptions& options, cv::Mat3f& into,
+                const WorkContext& work = {}) const;
+    void render(ConstantCoefficient coefficient, const RelightOptions& options, Encoding encoding, cv::Mat3b& into,
+                const WorkContext& work = {}) const;
 
 private:
     struct Prepared;
