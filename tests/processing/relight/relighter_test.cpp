@@ -1,6 +1,7 @@
 #include "processing/relight/relighter.h"
 
 #include <gmock/gmock.h>
+#include <hwy/highway.h>
 
 #include <cmath>
 #include <random>
@@ -171,6 +172,44 @@ TEST_P(RelighterModels, SameBitsOnAnyNumberOfThreads) {
 
 INSTANTIATE_TEST_SUITE_P(Settings, RelighterModels, testing::ValuesIn(settings()),
                          [](const auto& setting) { return std::string(setting.param.name); });
+
+/// Lets Highway use one of its targets alone as long as it lives.
+class OnlyTarget {
+public:
+    explicit OnlyTarget(std::int64_t target) { choose(target); }
+    OnlyTarget(const OnlyTarget&) = delete;
+    OnlyTarget& operator=(const OnlyTarget&) = delete;
+    ~OnlyTarget() { choose(0); }
+
+private:
+    static void choose(std::int64_t targets) {
+        hwy::SetSupportedTargetsForTest(targets);
+        hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    }
+};
+
+TEST(Relighter, EveryKindOfProcessorAgrees) {
+    const RelightScene scene = random_scene({131, 77});
+    int kinds = 0;
+    const std::int64_t here = hwy::SupportedTargets() & HWY_TARGETS;
+    for (int bit = 0; bit < 63; ++bit) {
+        const std::int64_t target = std::int64_t{1} << bit;
+        if ((here & target) == 0) continue;
+        ++kinds;
+        const OnlyTarget only(target);
+        const Relighter relighter(scene);
+        for (const Setting& setting : settings()) {
+            const cv::Mat3f truth = reference(scene, setting.lights, setting.options);
+            cv::Mat3f floats(relighter.size());
+            cv::Mat3b bytes(relighter.size());
+            relighter.render(setting.lights, setting.options, floats);
+            relighter.render(setting.lights, setting.options, Encoding::srgb, bytes);
+            EXPECT_LT(largest_difference(floats, truth), 2e-4) << hwy::TargetName(target);
+            EXPECT_LE(largest_difference(bytes, viewable(floats)), 1) << hwy::TargetName(target);
+        }
+    }
+    EXPECT_GE(kinds, 1);
+}
 
 TEST(Relighter, EveryByteOfTheCurveIsSrgb) {
     // One texel whose S is the ramp 0...1, one row of pixels that take 4001 values from it.
