@@ -137,8 +137,7 @@ FoldedEnvironment::FoldedEnvironment(const std::vector<DistantLight>& lights, co
             const Weights weights = fold_normal(lights, normal_of_node(row, column, nodes_), maps.levels, options);
             for (int k = 0; k < texels_; ++k)
                 shading_[node * width + k + 1] = table_entry(shaded(maps, k, weights.levels));
-            if (!mirrored_.empty())
-                mirrored_[node] = table_entry(weights.mirrored.mul(options.specular_colour));
+            if (!mirrored_.empty()) mirrored_[node] = table_entry(weights.mirrored.mul(options.specular_colour));
         }
     });
 }

@@ -28,10 +28,10 @@ struct RelightOptions {
     ReflectanceModel model = ReflectanceModel::lambert;
     Lookup lookup = Lookup::detail;
     OutOfRange out_of_range = OutOfRange::clamp;
-    double phong_diffuse = 0.7;              ///< k_d, 0...1
-    double phong_specular = 0.3;             ///< k_s, 0...1
-    double phong_exponent = 20.0;            ///< n, 1...1000
-    cv::Vec3d specular_colour = {1, 1, 1};   ///< phong_split: radiance of a whole highlight, light of intensity 1; 0...1
+    double phong_diffuse = 0.7;             ///< k_d, 0...1
+    double phong_specular = 0.3;            ///< k_s, 0...1
+    double phong_exponent = 20.0;           ///< n, 1...1000
+    cv::Vec3d specular_colour = {1, 1, 1};  ///< phong_split: radiance of a whole highlight, light of intensity 1; 0...1
     double environment_yaw = 0.0;  ///< radians; right-handed about +y: what stood behind the object moves to the left
     double exposure = 1.0;         ///< factor on the result, 0...1e9
 
@@ -55,8 +55,8 @@ struct Environment {
     cv::Mat3f radiance;
 };
 
-/// The same coefficient r in every pixel, for a light of intensity 1: a stack over r shows how a texture changes from dark
-/// to bright (thesis, the pseudo-BTF figure).
+/// The same coefficient r in every pixel, for a light of intensity 1: a stack over r shows how a texture changes from
+/// dark to bright (thesis, the pseudo-BTF figure).
 struct ConstantCoefficient {
     double r;  ///< 0...1
 };

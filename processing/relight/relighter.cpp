@@ -31,7 +31,8 @@ std::vector<cv::Vec4f> shading_table(const ShadingMaps& maps) {
 /// The scene's own pixels, a block at a time.
 class ScenePixels {
 public:
-    explicit ScenePixels(const RelightScene& scene) : scene_(scene), per_albedo_(scene.index.texels + 1, cv::Vec3f(0, 0, 0)) {
+    explicit ScenePixels(const RelightScene& scene)
+        : scene_(scene), per_albedo_(scene.index.texels + 1, cv::Vec3f(0, 0, 0)) {
         for (int k = 0; k < scene.index.texels; ++k)
             for (int c = 0; c < 3; ++c)
                 if (const float mean = scene.shading.mean_albedo(k, 0)[c]; mean > smallest_mean_albedo)

@@ -46,8 +46,8 @@ public:
     /// Of the options, lookup and exposure are used; the model and the yaw are those of the fold.
     void render(const FoldedEnvironment& environment, const RelightOptions& options, cv::Mat3f& into,
                 const WorkContext& work = {}) const;
-    void render(const FoldedEnvironment& environment, const RelightOptions& options, Encoding encoding,
-                cv::Mat3b& into, const WorkContext& work = {}) const;
+    void render(const FoldedEnvironment& environment, const RelightOptions& options, Encoding encoding, cv::Mat3b& into,
+                const WorkContext& work = {}) const;
 
     void render(ConstantCoefficient coefficient, const RelightOptions& options, cv::Mat3f& into,
                 const WorkContext& work = {}) const;

@@ -141,8 +141,8 @@ struct Reflection {
         const Vector normal_z = hn::Load(d, block.normal[2] + i);
         const Vector r_dot_v = hn::Sub(hn::Mul(hn::Mul(set(2), cosine), normal_z), z);
         const auto visible = hn::And(hn::Gt(r_dot_v, set(1e-30)), hn::Gt(cosine, zero()));
-        const Vector power = hn::Exp(d, hn::Max(hn::Mul(exponent, hn::Log(d, hn::IfThenElse(visible, r_dot_v, set(1)))),
-                                                set(-87)));
+        const Vector power =
+            hn::Exp(d, hn::Max(hn::Mul(exponent, hn::Log(d, hn::IfThenElse(visible, r_dot_v, set(1)))), set(-87)));
         return hn::IfThenElseZero(visible, power);
     }
 
@@ -157,9 +157,8 @@ void locate(const Frame& frame, const PixelBlock& block, const DistantLight& lig
     const cv::Vec3d& colour = frame.options.specular_colour;
     switch (frame.options.model) {
         case ReflectanceModel::lambert:
-            return for_vectors([&](std::size_t i) {
-                put_position(frame, block, reflection.n_dot_l(block, i), i, positions);
-            });
+            return for_vectors(
+                [&](std::size_t i) { put_position(frame, block, reflection.n_dot_l(block, i), i, positions); });
         case ReflectanceModel::phong:
             return for_vectors([&](std::size_t i) {
                 const Vector cosine = reflection.n_dot_l(block, i);
@@ -264,8 +263,9 @@ void receive_from_environment(const FoldedEnvironment& environment, const PixelB
     const int nodes = environment.nodes();
     find_cells(nodes, block, cells);
     if (!environment.mirrored().empty()) {
-        look_up_cells(environment.mirrored().data(), nodes, 1, cells, [](std::size_t) { return std::size_t{0}; },
-                      received.through_shading);
+        look_up_cells(
+            environment.mirrored().data(), nodes, 1, cells, [](std::size_t) { return std::size_t{0}; },
+            received.through_shading);
         for_vectors([&](std::size_t i) {
             Vector rgb[3], spare;
             hn::LoadInterleaved4(Floats(), received.through_shading + 4 * i, rgb[0], rgb[1], rgb[2], spare);
@@ -273,8 +273,9 @@ void receive_from_environment(const FoldedEnvironment& environment, const PixelB
                 hn::Store(hn::IfThenElseZero(inside(block, i), rgb[c]), Floats(), received.mirrored[c] + i);
         });
     }
-    look_up_cells(environment.shading(), nodes, environment.texels() + 1, cells,
-                  [&](std::size_t p) { return static_cast<std::size_t>(block.texel[p]); }, received.through_shading);
+    look_up_cells(
+        environment.shading(), nodes, environment.texels() + 1, cells,
+        [&](std::size_t p) { return static_cast<std::size_t>(block.texel[p]); }, received.through_shading);
 }
 
 /// Returns whether `mirrored` was filled.
@@ -313,12 +314,11 @@ void finish(const Frame& frame, const PixelBlock& block, const Received& receive
     });
 }
 
-/// 255 times the sRGB curve of 0...1: the line near black, elsewhere a polynomial of the square root that is 0.09 levels
-/// off at most (minimax over 0.0031308...1).
+/// 255 times the sRGB curve of 0...1: the line near black, elsewhere a polynomial of the square root that is 0.09
+/// levels off at most (minimax over 0.0031308...1).
 HWY_INLINE Vector srgb_level(Vector linear) {
     const Vector root = hn::Sqrt(linear);
-    constexpr double coefficients[] = {0.51730531,  -1.62366346, 2.03157759,
-                                       -1.40273654, 1.51795065,  -0.04010959};
+    constexpr double coefficients[] = {0.51730531, -1.62366346, 2.03157759, -1.40273654, 1.51795065, -0.04010959};
     Vector curve = set(255 * coefficients[0]);
     for (int i = 1; i < 6; ++i) curve = hn::MulAdd(curve, root, set(255 * coefficients[i]));
     return hn::IfThenElse(hn::Le(linear, set(0.0031308)), hn::Mul(linear, set(255 * 12.92)), curve);

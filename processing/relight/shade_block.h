@@ -23,8 +23,8 @@ struct Frame {
     RelightOptions options = {};
 };
 
-// One block through shading, detail and exposure to its pixels in R, G, B: 3 x 64 values. The vectors' lanes are pixels,
-// so that a pixel's value depends on nothing but itself.
+// One block through shading, detail and exposure to its pixels in R, G, B: 3 x 64 values. The vectors' lanes are
+// pixels, so that a pixel's value depends on nothing but itself.
 
 void shade_to_floats(const Frame& frame, const PixelBlock& block, float* rgb);
 void shade_to_bytes(const Frame& frame, const CompactBlock& block, Encoding encoding, std::uint8_t* rgb);

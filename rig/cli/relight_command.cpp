@@ -127,10 +127,9 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
                    {"fold_seconds", seconds.fold / count},
                    {"seconds_per_frame", seconds.render / count}};
     for (const auto& name : names) result.json["pictures"].push_back(name.string());
-    result.text =
-        fmt::format("{}: {} of {} x {} pixels, {:.2f} ms to render each", a.out.string(),
-                    names.size() == 1 ? "a picture" : fmt::format("{} pictures", names.size()),
-                    relighter.size().width, relighter.size().height, 1e3 * seconds.render / count);
+    result.text = fmt::format("{}: {} of {} x {} pixels, {:.2f} ms to render each", a.out.string(),
+                              names.size() == 1 ? "a picture" : fmt::format("{} pictures", names.size()),
+                              relighter.size().width, relighter.size().height, 1e3 * seconds.render / count);
     return result;
 }
 
@@ -138,13 +137,13 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
 
 void add_relight_command(CommandLine& line) {
     const auto a = std::make_shared<Arguments>();
-    CLI::App& command = line.add(
-        "relight", "Show the object under other lights or an environment, in one picture or many",
-        "darkbox relight s --light=-0.5,0.5,0.7 --light 1,0,1:0.2,0.3,0.6 --model phong --out relit.png\n  "
-        "darkbox relight s --environment sky.hdr --out under-sky.exr\n  "
-        "darkbox relight s --sequence circle --frames 100 --elevation 30 --out frames/%04d.png\n  "
-        "ffmpeg -framerate 25 -i frames/%04d.png -pix_fmt yuv420p circle.mp4",
-        [a](const WorkContext& work) { return run(*a, work); });
+    CLI::App& command =
+        line.add("relight", "Show the object under other lights or an environment, in one picture or many",
+                 "darkbox relight s --light=-0.5,0.5,0.7 --light 1,0,1:0.2,0.3,0.6 --model phong --out relit.png\n  "
+                 "darkbox relight s --environment sky.hdr --out under-sky.exr\n  "
+                 "darkbox relight s --sequence circle --frames 100 --elevation 30 --out frames/%04d.png\n  "
+                 "ffmpeg -framerate 25 -i frames/%04d.png -pix_fmt yuv420p circle.mp4",
+                 [a](const WorkContext& work) { return run(*a, work); });
     command.add_option("session", a->session, "The processed session's folder")->required();
     command
         .add_option("--out", a->out,

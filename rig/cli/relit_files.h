@@ -17,8 +17,8 @@ struct PictureStyle {
     int bits = 8;     ///< of a PNG: 8 or 16
 };
 
-/// Throws InputError for a name that does not end as a picture darkbox writes (.png, .jpg or .exr), and says how to make
-/// a video where it ends as one.
+/// Throws InputError for a name that does not end as a picture darkbox writes (.png, .jpg or .exr), and says how to
+/// make a video where it ends as one.
 void require_picture_name(const std::filesystem::path& path);
 
 /// Names of `count` pictures. One picture is `out` itself; several are `out` with a number from 1 on in place of its

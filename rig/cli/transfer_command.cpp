@@ -75,8 +75,7 @@ std::vector<fs::path> write_relit_pictures(const Arguments& a, const RelightScen
         render_to_file(relighter, lighting, options, style, written.back(), work);
     };
     for (const std::string& light : a.relight.lights) write(Lights{parse_light(light)});
-    for (const std::string& file : a.relight.environments)
-        write(relighter.fold(read_environment(file), options, work));
+    for (const std::string& file : a.relight.environments) write(relighter.fold(read_environment(file), options, work));
     return written;
 }
 

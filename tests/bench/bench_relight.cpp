@@ -27,9 +27,9 @@ RelightScene scene_of(cv::Size size) {
     for (int y = 0; y < size.height; ++y)
         for (int x = 0; x < size.width; ++x) {
             const double across = 2 * (x + 0.5) / size.width - 1, down = 2 * (y + 0.5) / size.height - 1;
-            scene.normals.normal(y, x) = cv::normalize(cv::Vec3f(
-                static_cast<float>(across + 0.2 * std::sin(0.4 * x)),
-                static_cast<float>(-down + 0.2 * std::cos(0.3 * y)), 0.8F));
+            scene.normals.normal(y, x) =
+                cv::normalize(cv::Vec3f(static_cast<float>(across + 0.2 * std::sin(0.4 * x)),
+                                        static_cast<float>(-down + 0.2 * std::cos(0.3 * y)), 0.8F));
             scene.albedo.albedo(y, x) = {0.8F * unit(random), 0.7F * unit(random), 0.6F * unit(random)};
             scene.index.label(y, x) = static_cast<std::uint16_t>(1 + random() % texels);
         }
@@ -64,7 +64,8 @@ void count(benchmark::State& state, double bytes_per_pixel) {
 /// it) gives. The frames' GB_per_second over this one's is the share of the bandwidth that they reach.
 void stream(benchmark::State& state) {
     const cv::Size size = size_of(state);
-    const auto words_in = static_cast<int>(size.width * bytes_in / 8), words_out = static_cast<int>(size.width * bytes_out / 8);
+    const auto words_in = static_cast<int>(size.width * bytes_in / 8),
+               words_out = static_cast<int>(size.width * bytes_out / 8);
     const cv::Mat1d in(size.height, words_in, 1.0);
     cv::Mat1d out(size.height, words_out);
     for (auto _ : state) {
@@ -98,7 +99,8 @@ void plain_loop(benchmark::State& state) {
                 const float position = r * (levels - 1);
                 const int below = std::min(static_cast<int>(position), levels - 2);
                 const cv::Vec3f* level = maps.radiance[scene.index.label(y, x) - 1] + below;
-                image(y, x) = (level[0] + (level[1] - level[0]) * (position - static_cast<float>(below))).mul(intensity);
+                image(y, x) =
+                    (level[0] + (level[1] - level[0]) * (position - static_cast<float>(below))).mul(intensity);
             }
         });
         benchmark::ClobberMemory();

@@ -74,8 +74,7 @@ cv::Mat3f reference(const RelightScene& scene, const Lights& lights, const Relig
                 if (o.model == ReflectanceModel::lambert)
                     sum += e.mul(detail).mul(shading_at(scene, y, x, cosine, o.out_of_range));
                 else if (o.model == ReflectanceModel::phong)
-                    sum += e.mul(detail).mul(
-                        shading_at(scene, y, x, o.phong_diffuse * cosine + gloss, o.out_of_range));
+                    sum += e.mul(detail).mul(shading_at(scene, y, x, o.phong_diffuse * cosine + gloss, o.out_of_range));
                 else
                     sum += o.phong_diffuse * e.mul(detail).mul(shading_at(scene, y, x, cosine, o.out_of_range)) +
                            gloss * e.mul(o.specular_colour);
@@ -118,8 +117,8 @@ std::vector<Setting> settings() {
     split.model = ReflectanceModel::phong_split;
     split.lookup = Lookup::detail;
     split.specular_colour = {0.9, 0.5, 0.2};
-    return {{"lambert", one, lambert}, {"thesis", three, thesis}, {"phong", three, phong}, {"narrow", one, narrow},
-            {"scaled", one, scaled},   {"split", three, split}};
+    return {{"lambert", one, lambert}, {"thesis", three, thesis}, {"phong", three, phong},
+            {"narrow", one, narrow},   {"scaled", one, scaled},   {"split", three, split}};
 }
 
 class RelighterModels : public testing::TestWithParam<Setting> {};

@@ -135,8 +135,9 @@ TEST_F(BadInput, MalformedLightIsRefusedBeforeAnyWork) {
     expect_one_error(darkbox_program({"relight", s, "--light", "1,2", "--out", path("x.png").string()}),
                      "--light '1,2'");
     expect_one_error(darkbox_program({"relight", s, "--out", path("x.png").string()}), "--light");
-    expect_one_error(darkbox_program({"relight", s, "--sequence", "turn", "--light", "0,0,1", "--out", path("x").string()}),
-                     "--environment");
+    expect_one_error(
+        darkbox_program({"relight", s, "--sequence", "turn", "--light", "0,0,1", "--out", path("x").string()}),
+        "--environment");
     expect_one_error(darkbox_program({"relight", s, "--light", "0,0,1", "--out", path("x.mp4").string()}), "ffmpeg");
     EXPECT_FALSE(fs::exists(path("x.png")));
 }
