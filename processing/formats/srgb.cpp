@@ -2,9 +2,25 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 namespace darkbox {
+namespace {
+
+template <class Integer>
+cv::Mat_<cv::Vec<Integer, 3>> encoded(const cv::Mat3f& linear, double gain) {
+    constexpr auto full = static_cast<float>(std::numeric_limits<Integer>::max());
+    cv::Mat_<cv::Vec<Integer, 3>> shown(linear.size());
+    const auto factor = static_cast<float>(gain);
+    for (int y = 0; y < linear.rows; ++y)
+        for (int x = 0; x < linear.cols; ++x)
+            for (int c = 0; c < 3; ++c)
+                shown(y, x)[c] = cv::saturate_cast<Integer>(full * srgb_from_linear(linear(y, x)[c] * factor));
+    return shown;
+}
+
+}  // namespace
 
 float linear_from_srgb(float encoded) {
     return encoded <= 0.04045F ? encoded / 12.92F : std::pow((encoded + 0.055F) / 1.055F, 2.4F);
@@ -22,15 +38,9 @@ cv::Mat3f linear_from_srgb(const cv::Mat3f& encoded) {
     return linear;
 }
 
-cv::Mat3b viewable(const cv::Mat3f& linear, double gain) {
-    cv::Mat3b shown(linear.size());
-    const auto factor = static_cast<float>(gain);
-    for (int y = 0; y < linear.rows; ++y)
-        for (int x = 0; x < linear.cols; ++x)
-            for (int c = 0; c < 3; ++c)
-                shown(y, x)[c] = cv::saturate_cast<uchar>(255.0F * srgb_from_linear(linear(y, x)[c] * factor));
-    return shown;
-}
+cv::Mat3b viewable(const cv::Mat3f& linear, double gain) { return encoded<uchar>(linear, gain); }
+
+cv::Mat3w viewable_16(const cv::Mat3f& linear, double gain) { return encoded<ushort>(linear, gain); }
 
 double viewing_gain(const cv::Mat3f& linear, const cv::Mat1b& mask, double percentile) {
     std::vector<float> brightest;

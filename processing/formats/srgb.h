@@ -12,6 +12,8 @@ cv::Mat3f linear_from_srgb(const cv::Mat3f& encoded);
 
 /// Linear radiance for looking at: times `gain`, sRGB-encoded, 8 bits, cut at 0 and 1. Still R, G, B.
 cv::Mat3b viewable(const cv::Mat3f& linear, double gain = 1.0);
+/// The same in 16 bits.
+cv::Mat3w viewable_16(const cv::Mat3f& linear, double gain = 1.0);
 
 /// The gain that brings the given percentile (0...100) of the brightest channel inside the mask to 1.
 /// 1 for a black picture.

@@ -2,6 +2,7 @@
 
 #include "processing/formats/srgb.h"
 #include "processing/pipeline/steps.h"
+#include "processing/relight/relighter.h"
 
 namespace darkbox {
 namespace {
@@ -35,14 +36,17 @@ std::vector<Setting> settings() {
 
 std::vector<RelitPicture> relight_by_default(const RelightScene& scene, const WorkContext& work) {
     const double gain = viewing_gain(scene.albedo.albedo, scene.albedo.valid, 99.0);
+    const Relighter relighter(scene, work);
     const std::vector<Setting> all = settings();
     std::vector<RelitPicture> pictures;
     for (const Setting& setting : all) {
         step(work, {"relighting", pictures.size(), all.size(), setting.name});
         RelightOptions options;
         options.model = setting.model;
-        const RelightResult relit = relight(scene, setting.lights, options, work);
-        pictures.push_back({setting.name, setting.caption, viewable(relit.image, gain)});
+        options.exposure = gain;
+        cv::Mat3b image(relighter.size());
+        relighter.render(setting.lights, options, Encoding::srgb, image, work);
+        pictures.push_back({setting.name, setting.caption, image});
     }
     return pictures;
 }

@@ -2,43 +2,26 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/core.hpp>
 
-#include "processing/relight/relight.h"
+#include "processing/relight/environment.h"
 
 namespace darkbox {
 
-// The rendering coefficient r of a normal and a direction to the light, both unit vectors, seen from V = (0, 0, 1).
-// Another reflectance model is another such function object and a line in with_model().
-
-/// r = max(0, N.L).
-struct LambertCoefficient {
-    float operator()(const cv::Vec3f& normal, const cv::Vec3f& light) const {
-        return std::max(0.0F, normal.dot(light));
-    }
+/// What a light makes of a normal, both unit vectors, seen from V = (0, 0, 1).
+struct Coefficients {
+    double shading = 0;   ///< r, at which S is looked up
+    double mirrored = 0;  ///< factor on the light's intensity that does not go through S
 };
 
-/// r = k_d N.L + k_s max(0, R.V)^n with R the mirrored light; 0 where the light is behind the surface (Phong 1975).
-struct PhongCoefficient {
-    float specular;
-    float exponent;
-
-    float operator()(const cv::Vec3f& normal, const cv::Vec3f& light) const {
-        const float n_dot_l = normal.dot(light);
-        if (!(n_dot_l > 0)) return 0;
-        const float r_dot_v = 2 * n_dot_l * normal[2] - light[2];
-        const float highlight = r_dot_v > 0 ? std::pow(r_dot_v, exponent) : 0.0F;
-        return (1 - specular) * n_dot_l + specular * highlight;
-    }
-};
-
-/// Calls `body` with the coefficient that the options ask for, so that the choice is made once and not in each pixel.
-template <class Body>
-decltype(auto) with_model(const RelightOptions& options, Body&& body) {
-    if (options.model == ReflectanceModel::phong)
-        return body(
-            PhongCoefficient{static_cast<float>(options.phong_specular), static_cast<float>(options.phong_exponent)});
-    return body(LambertCoefficient{});
+/// The models of ReflectanceModel, for folding (Phong 1975). Nothing is reflected by a surface that faces away.
+inline Coefficients coefficients(const cv::Vec3d& normal, const cv::Vec3d& light, const RelightOptions& options) {
+    const double n_dot_l = normal.dot(light);
+    if (!(n_dot_l > 0)) return {};
+    if (options.model == ReflectanceModel::lambert) return {n_dot_l, 0};
+    const double r_dot_v = 2 * n_dot_l * normal[2] - light[2];
+    const double highlight = r_dot_v > 0 ? options.phong_specular * std::pow(r_dot_v, options.phong_exponent) : 0.0;
+    if (options.model == ReflectanceModel::phong) return {options.phong_diffuse * n_dot_l + highlight, 0};
+    return {n_dot_l, highlight};
 }
 
 }  // namespace darkbox

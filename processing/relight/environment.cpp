@@ -7,15 +7,15 @@
 #include <numbers>
 
 #include "processing/relight/coefficient.h"
-#include "processing/relight/levels.h"
 
 namespace darkbox {
 namespace {
 
 constexpr int patch_rows = 32;
 constexpr int patch_columns = 64;
-constexpr int cells = 64;  ///< of the grid over normals, per side
-constexpr int nodes = cells + 1;
+constexpr int most_nodes = 65;  ///< of the grid over normals, per side
+constexpr int fewest_nodes = 9;
+constexpr std::size_t largest_table = std::size_t{1} << 29;  ///< bytes
 
 /// Directions and solid angles of an equirectangular image, as Environment describes it.
 class ProbeGeometry {
@@ -55,34 +55,54 @@ DistantLight light_of_patch(const cv::Mat3f& radiance, const ProbeGeometry& geom
 /// One axis of the patches: border i of `parts` over `length` pixels.
 int border(int i, int parts, int length) { return static_cast<int>(static_cast<long>(i) * length / parts); }
 
-/// The hemisphere z >= 0 folded onto the square [-1, 1]^2 (octahedral map, turned by 45 degrees): even cells, no seam.
-cv::Vec2f square_from_normal(const cv::Vec3f& normal) {
-    const float z = std::max(0.0F, normal[2]);
-    const float scale = 1.0F / (std::abs(normal[0]) + std::abs(normal[1]) + z);
-    return {(normal[0] + normal[1]) * scale, (normal[0] - normal[1]) * scale};
+/// Node (row, column) of the square [-1, 1]^2 that the hemisphere z >= 0 is folded onto (octahedral map, turned by 45
+/// degrees): even cells, no seam.
+cv::Vec3d normal_of_node(int row, int column, int nodes) {
+    const double right = 2.0 * column / (nodes - 1) - 1, down = 2.0 * row / (nodes - 1) - 1;
+    const double x = 0.5 * (right + down), y = 0.5 * (right - down);
+    return cv::normalize(cv::Vec3d(x, y, std::max(0.0, 1 - std::abs(x) - std::abs(y))));
 }
 
-cv::Vec3f normal_from_square(const cv::Vec2f& square) {
-    const float x = 0.5F * (square[0] + square[1]);
-    const float y = 0.5F * (square[0] - square[1]);
-    return cv::normalize(cv::Vec3f(x, y, std::max(0.0F, 1 - std::abs(x) - std::abs(y))));
-}
+/// What a normal receives: weights of the levels, and what does not go through S.
+struct Weights {
+    std::vector<cv::Vec3d> levels;
+    cv::Vec3d mirrored{0, 0, 0};
+};
 
-float coordinate_of_node(int i) { return 2.0F * static_cast<float>(i) / cells - 1.0F; }
-
-/// The weight of each level for one normal.
-template <class Model>
-std::vector<cv::Vec3d> fold_normal(const std::vector<DistantLight>& lights, const cv::Vec3f& normal,
-                                   const Model& coefficient, int levels) {
-    std::vector<cv::Vec3d> sums(levels, cv::Vec3d(0, 0, 0));
+Weights fold_normal(const std::vector<DistantLight>& lights, const cv::Vec3d& normal, int levels,
+                    const RelightOptions& options) {
+    Weights sums{std::vector<cv::Vec3d>(static_cast<std::size_t>(levels), cv::Vec3d(0, 0, 0))};
+    const double diffuse = options.model == ReflectanceModel::phong_split ? options.phong_diffuse : 1;
+    const bool scaled = options.out_of_range == OutOfRange::scale;
     for (const DistantLight& light : lights) {
-        const float r = coefficient(normal, light.direction);
+        const cv::Vec3d intensity(light.intensity);
+        const auto [r, mirrored] = coefficients(normal, light.direction, options);
+        sums.mirrored += intensity * mirrored;
         if (!(r > 0)) continue;
-        const LevelPosition position(r, levels);
-        sums[position.below] += cv::Vec3d(light.intensity) * (1.0 - position.fraction);
-        sums[position.below + 1] += cv::Vec3d(light.intensity) * static_cast<double>(position.fraction);
+        const double position = std::min(r, 1.0) * (levels - 1);
+        const int below = std::min(static_cast<int>(position), levels - 2);
+        const double fraction = position - below, factor = diffuse * (scaled ? std::max(r, 1.0) : 1.0);
+        sums.levels[below] += intensity * (factor * (1 - fraction));
+        sums.levels[below + 1] += intensity * (factor * fraction);
     }
     return sums;
+}
+
+FoldedEnvironment::Colour table_entry(const cv::Vec3d& c) {
+    return {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), 0.0F};
+}
+
+/// Of texel k, counted from 0.
+cv::Vec3d shaded(const ShadingMaps& maps, int k, const std::vector<cv::Vec3d>& weights) {
+    cv::Vec3d sum(0, 0, 0);
+    for (std::size_t level = 0; level < weights.size(); ++level)
+        sum += weights[level].mul(cv::Vec3d(maps.radiance(k, static_cast<int>(level))));
+    return sum;
+}
+
+int nodes_for(int texels) {
+    const double affordable = static_cast<double>(largest_table) / sizeof(FoldedEnvironment::Colour) / (texels + 1);
+    return std::clamp(static_cast<int>(std::sqrt(affordable)), fewest_nodes, most_nodes);
 }
 
 }  // namespace
@@ -107,49 +127,19 @@ std::vector<DistantLight> probe_lights(const Environment& environment, double ya
 
 FoldedEnvironment::FoldedEnvironment(const std::vector<DistantLight>& lights, const ShadingMaps& maps,
                                      const RelightOptions& options)
-    : levels_(maps.levels), weights_(static_cast<std::size_t>(nodes) * nodes * levels_) {
-    const auto colour = [](const auto& c) {
-        return Colour{static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]), 0.0F};
-    };
-    with_model(options, [&](const auto& coefficient) {
-        tbb::parallel_for(0, nodes, [&](int row) {
-            for (int column = 0; column < nodes; ++column) {
-                const cv::Vec2f square(coordinate_of_node(column), coordinate_of_node(row));
-                const auto weights = fold_normal(lights, normal_from_square(square), coefficient, levels_);
-                const std::size_t first = (static_cast<std::size_t>(row) * nodes + column) * levels_;
-                std::transform(weights.begin(), weights.end(), weights_.begin() + first, colour);
-            }
-        });
+    : nodes_(nodes_for(maps.texels)), texels_(maps.texels) {
+    const std::size_t nodes = static_cast<std::size_t>(nodes_) * nodes_, width = static_cast<std::size_t>(texels_) + 1;
+    shading_.resize(nodes * width);
+    if (options.model == ReflectanceModel::phong_split) mirrored_.resize(nodes);
+    tbb::parallel_for(0, nodes_, [&](int row) {
+        for (int column = 0; column < nodes_; ++column) {
+            const std::size_t node = static_cast<std::size_t>(row) * nodes_ + column;
+            const Weights weights = fold_normal(lights, normal_of_node(row, column, nodes_), maps.levels, options);
+            for (int k = 0; k < texels_; ++k)
+                shading_[node * width + k + 1] = table_entry(shaded(maps, k, weights.levels));
+            if (!mirrored_.empty()) mirrored_[node] = table_entry(weights.mirrored.mul(options.specular_colour));
+        }
     });
-    shading_.reserve(static_cast<std::size_t>(maps.texels) * levels_);
-    for (const cv::Vec3f& value : maps.radiance) shading_.push_back(colour(value));
-}
-
-const FoldedEnvironment::Colour* FoldedEnvironment::node(int row, int column) const {
-    return &weights_[(static_cast<std::size_t>(row) * nodes + column) * levels_];
-}
-
-cv::Vec3f FoldedEnvironment::radiance(const cv::Vec3f& normal, int label) const {
-    const cv::Vec2f square = square_from_normal(normal);
-    const LevelPosition column(0.5F * (square[0] + 1), nodes);
-    const LevelPosition row(0.5F * (square[1] + 1), nodes);
-    const Colour* top = node(row.below, column.below);
-    const Colour* bottom = node(row.below + 1, column.below);
-    const Colour* shading = &shading_[static_cast<std::size_t>(label - 1) * levels_];
-    Colour at_top{};
-    Colour at_top_right{};
-    Colour at_bottom{};
-    Colour at_bottom_right{};
-    for (int level = 0; level < levels_; ++level) {
-        at_top += shading[level] * top[level];
-        at_top_right += shading[level] * top[level + levels_];
-        at_bottom += shading[level] * bottom[level];
-        at_bottom_right += shading[level] * bottom[level + levels_];
-    }
-    const Colour upper = at_top + column.fraction * (at_top_right - at_top);
-    const Colour lower = at_bottom + column.fraction * (at_bottom_right - at_bottom);
-    const Colour sum = upper + row.fraction * (lower - upper);
-    return {sum[0], sum[1], sum[2]};
 }
 
 }  // namespace darkbox

@@ -17,26 +17,31 @@ struct DistantLight {
 /// bright source stays where it is; dark patches are left out. `yaw` as in RelightOptions.
 std::vector<DistantLight> probe_lights(const Environment& environment, double yaw);
 
-/// A probe folded over normals and levels. V is fixed, so r depends on the normal alone, and with w the summed weights
-/// of linear interpolation: sum over lights of E x S(k, r(N, L)) = sum over levels of w(N, level) x S(k, level).
-/// Exact at the nodes of a grid over the hemisphere of normals that face the viewer, bilinear between them; normals
-/// that face away count as the rim's. Immutable after construction, thus thread-safe.
+/// A probe folded over normals and texels. V is fixed, so r depends on the normal alone, and with w the summed weights
+/// of linear interpolation: sum over lights of E x S(k, r(N, L)) = sum over levels of w(N, level) x S(k, level) =
+/// F(N, k), a table. Exact at the nodes of a grid over the hemisphere of normals that face the viewer, bilinear between
+/// them; normals that face away count as the rim's. The grid's steps are 1.5 to 3 degrees: Phong lobes narrower than
+/// that are softened. Beyond 8192 texels the grid is coarser, so that the table stays below half a gibibyte.
+/// Immutable after construction, thus thread-safe.
 class FoldedEnvironment {
 public:
     FoldedEnvironment(const std::vector<DistantLight>& lights, const ShadingMaps& maps, const RelightOptions& options);
 
-    /// Of texel `label` with that unit normal.
-    cv::Vec3f radiance(const cv::Vec3f& normal, int label) const;
+    /// R, G, B and one lane to spare.
+    using Colour = cv::Vec4f;
+
+    int nodes() const { return nodes_; }  ///< per side of the grid
+    int texels() const { return texels_; }
+    /// [row][column][label], label 0 is black.
+    const Colour* shading() const { return shading_.data(); }
+    /// Of the specular part that does not go through S, [row][column]; empty for models without.
+    const std::vector<Colour>& mirrored() const { return mirrored_; }
 
 private:
-    /// R, G, B and one lane to spare, in a register.
-    using Colour [[gnu::vector_size(16)]] = float;
-
-    const Colour* node(int row, int column) const;
-
-    int levels_;
-    std::vector<Colour> weights_;  ///< [row][column][level]
-    std::vector<Colour> shading_;  ///< [texel][level]
+    int nodes_;
+    int texels_;
+    std::vector<Colour> shading_;
+    std::vector<Colour> mirrored_;
 };
 
 }  // namespace darkbox

@@ -8,19 +8,32 @@
 
 namespace darkbox {
 
-enum class ReflectanceModel { lambert, phong };
+/// How normal and light become the radiance of a texel k, for V = (0, 0, 1) and R the mirrored light.
+enum class ReflectanceModel {
+    lambert,      ///< S(k, N.L)
+    phong,        ///< S(k, k_d N.L + k_s (R.V)^n): one coefficient, the highlight is made of the texel's own radiance
+    phong_split,  ///< k_d S(k, N.L) + k_s (R.V)^n x specular colour: the lamp mirrored in a coat of gloss
+};
 enum class Lookup {
     thesis,  ///< the texel's radiance as it is
     detail,  ///< scaled by the pixel's own albedo over its texel's mean
+};
+/// What a coefficient beyond the last level looks up: r > 1 where k_d + k_s > 1.
+enum class OutOfRange {
+    clamp,  ///< S(k, 1)
+    scale,  ///< r x S(k, 1)
 };
 
 struct RelightOptions {
     ReflectanceModel model = ReflectanceModel::lambert;
     Lookup lookup = Lookup::detail;
-    double phong_specular = 0.3;   ///< k_s, 0...1; k_d = 1 - k_s
-    double phong_exponent = 20.0;  ///< 1...1000
+    OutOfRange out_of_range = OutOfRange::clamp;
+    double phong_diffuse = 0.7;             ///< k_d, 0...1
+    double phong_specular = 0.3;            ///< k_s, 0...1
+    double phong_exponent = 20.0;           ///< n, 1...1000
+    cv::Vec3d specular_colour = {1, 1, 1};  ///< phong_split: radiance of a whole highlight, light of intensity 1; 0...1
     double environment_yaw = 0.0;  ///< radians; right-handed about +y: what stood behind the object moves to the left
-    double exposure = 1.0;         ///< factor on the result
+    double exposure = 1.0;         ///< factor on the result, 0...1e9
 
     /// Throws InputError that names the field and the allowed range.
     void validate() const;
@@ -42,27 +55,29 @@ struct Environment {
     cv::Mat3f radiance;
 };
 
+/// The same coefficient r in every pixel, for a light of intensity 1: a stack over r shows how a texture changes from
+/// dark to bright (thesis, the pseudo-BTF figure).
+struct ConstantCoefficient {
+    double r;  ///< 0...1
+};
+
 struct RelightResult {
     cv::Mat3f image;            ///< linear radiance; 0 outside the object
     double fold_seconds = 0;    ///< environment: building its table
     double render_seconds = 0;  ///< the frame itself
 };
 
-/// Sum over lights of intensity x S(k, r_i): radiances add, coefficients do not (thesis, relighting). r beyond the last
-/// level is clamped. Lights not `used` are left out. Bit-identical on any number of threads. Throws InputError for maps
-/// that do not fit together, normals or directions that are not unit vectors, and when no light is left.
+// One picture of a scene. Who needs several prepares a Relighter once.
+
+/// Sum over lights of intensity x S(k, r_i): radiances add, coefficients do not (thesis, relighting). Lights not `used`
+/// are left out; a near lamp lights as from its direction at the object's centroid. Bit-identical on any number of
+/// threads. Throws InputError for maps that do not fit together, normals or directions that are not unit vectors, and
+/// when no light is left.
 RelightResult relight(const RelightScene& scene, const Lights& lights, const RelightOptions& options = {},
                       const WorkContext& work = {});
 
-/// Under an environment: since V is fixed, r depends on the normal alone, so the probe is folded once into weights over
-/// normals and levels. The fold takes the probe as about two thousand lights and normals in steps of 1.5 to 3 degrees:
-/// Phong lobes narrower than that are softened. Throws InputError for a probe that is empty, negative or not finite.
+/// Under an environment, see FoldedEnvironment. Throws InputError for a probe that is empty, negative or not finite.
 RelightResult relight(const RelightScene& scene, const Environment& environment, const RelightOptions& options = {},
                       const WorkContext& work = {});
-
-/// The object with the same coefficient r, 0...1, in every pixel: a stack over r shows how its texture changes from
-/// dark to bright (thesis, the pseudo-BTF figure). Throws InputError as relight() does.
-cv::Mat3f at_constant_coefficient(const RelightScene& scene, double r, const RelightOptions& options = {},
-                                  const WorkContext& work = {});
 
 }  // namespace darkbox

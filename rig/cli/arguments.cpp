@@ -7,16 +7,11 @@
 #include <cmath>
 
 #include "acquisition/frame/error.h"
-#include "processing/formats/atomic_file.h"
-#include "processing/formats/exr.h"
-#include "processing/formats/png.h"
-#include "processing/formats/srgb.h"
 
 namespace darkbox {
 namespace {
 
 constexpr double shortest_direction = 1e-6;
-constexpr int jpeg_quality = 95;
 
 [[noreturn]] void malformed(const std::string& option, const std::string& text, const std::string& form) {
     throw InputError(fmt::format("{} '{}' is not {}", option, text, form), "see --help for an example");
@@ -65,7 +60,7 @@ std::pair<std::string, cv::Point2d> parse_highlight(const std::string& text) {
 }
 
 Light parse_light(const std::string& text) {
-    const auto at = text.find('@');
+    const auto at = text.find(':');
     const auto d = parse_numbers("--light", text.substr(0, at), 3);
     Light light;
     light.file = text;
@@ -90,20 +85,6 @@ void require_outside_payload(const std::filesystem::path& out) {
             (fs::exists(part.parent_path() / "bagit.txt") || fs::exists(part.parent_path() / "journal.jsonl")))
             throw InputError(fmt::format("'{}' lies inside the session {}", out.string(), part.parent_path().string()),
                              "write elsewhere: a session's data is never edited");
-}
-
-void write_relit(const std::filesystem::path& path, const cv::Mat3f& linear, double gain) {
-    const std::string extension = path.extension().string();
-    if (extension == ".exr") {
-        write_exr(path, linear);
-    } else if (extension == ".png") {
-        write_png(path, viewable(linear, gain));
-    } else if (extension == ".jpg" || extension == ".jpeg") {
-        write_file(path, encode_jpeg(viewable(linear, gain), jpeg_quality));
-    } else {
-        throw InputError(fmt::format("'{}' is not a picture darkbox writes", path.string()),
-                         "end the name in .png, .jpg or .exr (linear float)");
-    }
 }
 
 }  // namespace darkbox

@@ -28,13 +28,10 @@ GreyCard parse_grey_card(const std::string& text);
 /// "FRAME=X,Y".
 std::pair<std::string, cv::Point2d> parse_highlight(const std::string& text);
 
-/// "X,Y,Z" of any length but zero, or "X,Y,Z@R,G,B" with an intensity per channel; the direction is made unit length.
+/// "X,Y,Z" of any length but zero, or "X,Y,Z:R,G,B" with an intensity per channel; the direction is made unit length.
 Light parse_light(const std::string& text);
 
 /// Throws InputError when this output lies in the payload of a session: that is never edited.
 void require_outside_payload(const std::filesystem::path& out);
-
-/// Writes a linear picture: EXR as it is; PNG, JPEG or TIFF sRGB-encoded in 8 bits. Other extensions are an InputError.
-void write_relit(const std::filesystem::path& path, const cv::Mat3f& linear, double gain);
 
 }  // namespace darkbox

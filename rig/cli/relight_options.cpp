@@ -2,10 +2,12 @@
 
 #include <numbers>
 
+#include "rig/cli/arguments.h"
+
 namespace darkbox {
 
 void add_relight_options(CLI::App& command, RelightArguments& a) {
-    command.add_option("--light", a.lights, "Vector to a light, viewer frame: X,Y,Z or X,Y,Z@R,G,B; may be repeated")
+    command.add_option("--light", a.lights, "Vector to a light, viewer frame: X,Y,Z or X,Y,Z:R,G,B; may be repeated")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     command.add_option("--environment", a.environments, "Light probe, equirectangular .hdr or .exr")
@@ -14,21 +16,35 @@ void add_relight_options(CLI::App& command, RelightArguments& a) {
     command.add_option("--yaw", a.yaw_deg, "Turns the environment about the upright axis, degrees")
         ->capture_default_str();
     const std::map<std::string, ReflectanceModel> models{{"lambert", ReflectanceModel::lambert},
-                                                         {"phong", ReflectanceModel::phong}};
-    command.add_option("--model", a.options.model, "lambert or phong")
-        ->transform(CLI::CheckedTransformer(models).description("{lambert,phong}"));
+                                                         {"phong", ReflectanceModel::phong},
+                                                         {"phong-split", ReflectanceModel::phong_split}};
+    command
+        .add_option("--model", a.options.model,
+                    "lambert; phong: one coefficient, highlights of the texel's colour; phong-split: a coat of gloss")
+        ->transform(CLI::CheckedTransformer(models).description("{lambert,phong,phong-split}"));
     const std::map<std::string, Lookup> lookups{{"thesis", Lookup::thesis}, {"detail", Lookup::detail}};
     command
         .add_option("--lookup", a.options.lookup, "thesis: the texel's radiance; detail: scaled by the pixel's albedo")
         ->transform(CLI::CheckedTransformer(lookups).description("{thesis,detail}"));
+    const std::map<std::string, OutOfRange> beyond{{"clamp", OutOfRange::clamp}, {"scale", OutOfRange::scale}};
+    command
+        .add_option("--out-of-range", a.options.out_of_range,
+                    "Coefficients above 1 (k_d + k_s > 1): clamp to the brightest level, or scale it")
+        ->transform(CLI::CheckedTransformer(beyond).description("{clamp,scale}"));
+    command.add_option("--diffuse", a.options.phong_diffuse, "Phong's k_d, 0 to 1")->capture_default_str();
     command.add_option("--specular", a.options.phong_specular, "Phong's k_s, 0 to 1")->capture_default_str();
     command.add_option("--exponent", a.options.phong_exponent, "Phong's exponent, 1 to 1000")->capture_default_str();
+    command.add_option("--specular-colour", a.specular_colour, "Colour of phong-split's highlights: R,G,B, 0 to 1");
     command.add_option("--exposure", a.options.exposure, "Factor on the result")->capture_default_str();
 }
 
 RelightOptions relight_options(const RelightArguments& arguments) {
     RelightOptions options = arguments.options;
     options.environment_yaw = arguments.yaw_deg * std::numbers::pi / 180;
+    if (!arguments.specular_colour.empty()) {
+        const auto colour = parse_numbers("--specular-colour", arguments.specular_colour, 3);
+        options.specular_colour = {colour[0], colour[1], colour[2]};
+    }
     options.validate();
     return options;
 }

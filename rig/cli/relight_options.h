@@ -16,12 +16,13 @@ struct RelightArguments {
     std::vector<std::string> environments;
     RelightOptions options;
     double yaw_deg = 0;
+    std::string specular_colour;
 };
 
-/// Adds --light, --environment, --yaw, --model, --lookup, --specular, --exponent, --exposure.
+/// Adds --light, --environment, --yaw, --lookup, --exposure, --model and what belongs to the models.
 void add_relight_options(CLI::App& command, RelightArguments& arguments);
 
-/// Options with degrees turned into radians, validated.
+/// Options with degrees turned into radians and colours parsed, validated.
 RelightOptions relight_options(const RelightArguments& arguments);
 
 }  // namespace darkbox

@@ -15,6 +15,7 @@
 #include "rig/cli/arguments.h"
 #include "rig/cli/commands.h"
 #include "rig/cli/relight_options.h"
+#include "rig/cli/relit_files.h"
 
 namespace darkbox {
 namespace {
@@ -66,14 +67,15 @@ NormalMap load_target(const Arguments& a) {
 /// relit-1.png, relit-2.png, ... one for each light, then one for each environment.
 std::vector<fs::path> write_relit_pictures(const Arguments& a, const RelightScene& scene, const WorkContext& work) {
     const RelightOptions options = relight_options(a.relight);
-    const double gain = viewing_gain(scene.albedo.albedo, scene.albedo.valid);
+    const PictureStyle style{.gain = viewing_gain(scene.albedo.albedo, scene.albedo.valid)};
+    const Relighter relighter(scene, work);
     std::vector<fs::path> written;
-    const auto write = [&](const RelightResult& relit) {
+    const auto write = [&](const Lighting& lighting) {
         written.push_back(a.out / fmt::format("relit-{}.png", written.size() + 1));
-        write_relit(written.back(), relit.image, gain);
+        render_to_file(relighter, lighting, options, style, written.back(), work);
     };
-    for (const std::string& light : a.relight.lights) write(relight(scene, Lights{parse_light(light)}, options, work));
-    for (const std::string& file : a.relight.environments) write(relight(scene, read_environment(file), options, work));
+    for (const std::string& light : a.relight.lights) write(Lights{parse_light(light)});
+    for (const std::string& file : a.relight.environments) write(relighter.fold(read_environment(file), options, work));
     return written;
 }
 

@@ -1,4 +1,4 @@
-#include "processing/relight/relight.h"
+#include "processing/relight/relighter.h"
 
 #include <gmock/gmock.h>
 
@@ -109,6 +109,7 @@ TEST(Relight, PhongHighlightSitsHalfWayToTheLight) {
         for (int level = 0; level < scene.shading.levels; ++level)
             scene.shading.radiance(k, level) = cv::Vec3f::all(0.1F * static_cast<float>(level));
     RelightOptions options = phong();
+    options.phong_diffuse = 0;
     options.phong_specular = 1;
     options.phong_exponent = 100;
     const Light light = light_from(0.6, 0, 0.8);
@@ -122,11 +123,22 @@ TEST(Relight, PhongHighlightSitsHalfWayToTheLight) {
 
 TEST(Relight, ConstantCoefficientGrowsLinearly) {
     const RelightScene scene = sphere_scene(61);
-    const cv::Mat3f full = at_constant_coefficient(scene, 1.0);
+    const Relighter relighter(scene);
+    const auto at = [&](double r) {
+        cv::Mat3f image(relighter.size());
+        relighter.render(ConstantCoefficient{r}, {}, image);
+        return image;
+    };
+    const cv::Mat3f full = at(1.0);
     EXPECT_LT(largest_difference(full, scene.albedo.albedo), 1e-6);
-    EXPECT_LT(largest_difference(at_constant_coefficient(scene, 0.37), full * 0.37), 1e-6);
-    EXPECT_EQ(cv::norm(at_constant_coefficient(scene, 0.0), cv::NORM_INF), 0);
-    EXPECT_THROW(at_constant_coefficient(scene, 1.1), InputError);
+    EXPECT_LT(largest_difference(at(0.37), full * 0.37), 1e-6);
+    EXPECT_EQ(cv::norm(at(0.0), cv::NORM_INF), 0);
+    EXPECT_THROW(at(1.1), InputError);
+    cv::Mat3b bytes(relighter.size());
+    relighter.render(ConstantCoefficient{0.37}, {}, Encoding::linear, bytes);
+    cv::Mat3b linear;
+    at(0.37).convertTo(linear, CV_8U, 255);
+    EXPECT_LE(largest_difference(bytes, linear), 1);
 }
 
 TEST(Relight, TexelWithoutAlbedoKeepsItsShading) {

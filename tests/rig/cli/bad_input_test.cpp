@@ -135,7 +135,18 @@ TEST_F(BadInput, MalformedLightIsRefusedBeforeAnyWork) {
     expect_one_error(darkbox_program({"relight", s, "--light", "1,2", "--out", path("x.png").string()}),
                      "--light '1,2'");
     expect_one_error(darkbox_program({"relight", s, "--out", path("x.png").string()}), "--light");
+    expect_one_error(
+        darkbox_program({"relight", s, "--sequence", "turn", "--light", "0,0,1", "--out", path("x").string()}),
+        "--environment");
+    expect_one_error(darkbox_program({"relight", s, "--light", "0,0,1", "--out", path("x.mp4").string()}), "ffmpeg");
     EXPECT_FALSE(fs::exists(path("x.png")));
+}
+
+TEST_F(BadInput, MapsChangedByHandAreRefused) {
+    const std::string s = session();
+    ASSERT_EQ(darkbox_program({"process", s}).status, 0);
+    cv::imwrite(s + "/texels/index.png", cv::Mat1w(2, 3, std::uint16_t{1}));
+    expect_one_error(darkbox_program({"relight", s, "--light", "0,0,1", "--out", path("x.png").string()}), "2");
 }
 
 TEST_F(BadInput, EvaluateNeedsLightsAndATruthToCompareWith) {

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "processing/relight/environment.h"
+#include "processing/relight/pixel_block.h"
+#include "processing/relight/relight.h"
+#include "processing/relight/relighter.h"
+
+namespace darkbox {
+
+/// What one frame is rendered with. Tables are of R, G, B and one lane to spare; a label is a texel's, 0 is black.
+struct Frame {
+    const cv::Vec4f* shading = nullptr;  ///< [label][level]
+    int levels = 0;
+
+    // Lit by either lights, or an environment, or as if r were the same everywhere.
+    std::vector<DistantLight> lights = {};
+    const FoldedEnvironment* environment = nullptr;
+    float constant_r = -1;  ///< negative: not so
+
+    RelightOptions options = {};
+};
+
+// One block through shading, detail and exposure to its pixels in R, G, B: 3 x 64 values. The vectors' lanes are
+// pixels, so that a pixel's value depends on nothing but itself.
+
+void shade_to_floats(const Frame& frame, const PixelBlock& block, float* rgb);
+void shade_to_bytes(const Frame& frame, const CompactBlock& block, Encoding encoding, std::uint8_t* rgb);
+
+/// Unit normals to 16 bits, detail to half floats (65504 at most).
+CompactBlock compacted(const PixelBlock& block);
+
+}  // namespace darkbox
