@@ -4,7 +4,7 @@
 
 #include "acquisition/frame/error.h"
 #include "processing/formats/environment_file.h"
-#include "processing/formats/srgb.h"
+#include "processing/maps/srgb.h"
 #include "processing/pipeline/stages.h"
 #include "rig/cli/arguments.h"
 #include "rig/cli/commands.h"

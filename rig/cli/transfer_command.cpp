@@ -9,7 +9,7 @@
 #include "processing/formats/map_files.h"
 #include "processing/formats/picture.h"
 #include "processing/formats/png.h"
-#include "processing/formats/srgb.h"
+#include "processing/maps/srgb.h"
 #include "processing/pipeline/stages.h"
 #include "processing/transfer/transfer.h"
 #include "rig/cli/arguments.h"
