@@ -11,6 +11,7 @@
 #include "processing/maps/require.h"
 #include "processing/transfer/features.h"
 #include "processing/transfer/measures.h"
+#include "processing/transfer/patch_energy.h"
 #include "processing/transfer/pyramid.h"
 #include "processing/transfer/synthesis.h"
 
@@ -161,8 +162,13 @@ TransferResult transferred(const TransferSource& source, const NormalMap& target
     result.coverage_deg =
         coverage_deg({sources.front().normal, sources.front().valid}, {targets.front().normal, targets.front().valid});
     result.coherence = coherence(result.coordinates);
-    result.patch_energy = patch_energy(exemplar, result.albedo, options.window, white);
-    result.histogram_distance = histogram_distance(exemplar, result.albedo, white);
+    const Appearance shown = appearance_of({sources.front().normal, sources.front().valid}, exemplar, white);
+    const Appearance moved = appearance_of(target, result.albedo, white);
+    constexpr int sparse = 16;  // so that it costs little next to the synthesis
+    result.patch_energy = patch_energy(colour_patches(shown, options.window), colour_patches(moved, options.window),
+                                       options.window, sparse)
+                              .value_or(0);
+    result.histogram_distance = histogram_distance(shown, moved).value_or(0);
     return result;
 }
 
