@@ -13,6 +13,7 @@
 #include "processing/transfer/measures.h"
 #include "processing/transfer/patch_energy.h"
 #include "processing/transfer/pyramid.h"
+#include "processing/transfer/refinement.h"
 #include "processing/transfer/synthesis.h"
 
 namespace darkbox {
@@ -99,8 +100,12 @@ public:
 
     void begin_level() { before_ += std::exchange(rows_, 0); }
 
-    void rows_done(int rows) {
+    void check() const {
         if (work_.cancelled()) throw Cancelled("texture transfer was cancelled", "start it again when you like");
+    }
+
+    void rows_done(int rows) {
+        check();
         if (rows == rows_) return;
         rows_ = rows;
         work_.tell({"transfer", static_cast<std::size_t>(before_ + rows_), static_cast<std::size_t>(total_), {}});
@@ -113,8 +118,10 @@ private:
     int rows_ = 0;
 };
 
-cv::Mat2i synthesise(const MapPyramid& source, MapPyramid& target, const FeatureSpace& space,
+cv::Mat2i synthesise(const MapPyramid& source, MapPyramid& target, const FeatureSpace& space, float white,
                      const TransferOptions& options, const WorkContext& work) {
+    const MapLevel& finest = source.front();
+    const ExpectedLook look(appearance_of({finest.normal, finest.valid}, {finest.albedo, finest.valid}, white));
     Progress progress(work, target);
     cv::Mat2i coordinates;
     const int coarsest = static_cast<int>(source.size()) - 1;
@@ -125,6 +132,8 @@ cv::Mat2i synthesise(const MapPyramid& source, MapPyramid& target, const Feature
             {source[level], has_coarser ? &source[level + 1] : nullptr, target[level],
              has_coarser ? &target[level + 1] : nullptr, coordinates, std::ldexp(options.kappa, -level)},
             space, options.seed, [&](int rows) { progress.rows_done(rows); });
+        coordinates = refine_level({source[level], target[level], look, level, white}, coordinates, options,
+                                   [&] { progress.check(); });
     }
     return coordinates;
 }
@@ -156,7 +165,7 @@ TransferResult transferred(const TransferSource& source, const NormalMap& target
     const FeatureSpace space(options, white, mean_albedo(sources.front()));
 
     TransferResult result;
-    result.coordinates = synthesise(sources, targets, space, options, work);
+    result.coordinates = synthesise(sources, targets, space, white, options, work);
     result.albedo = read_albedo(source.albedo, result.coordinates, target.valid);
     result.index = read_index(source.index, result.coordinates, target.valid);
     result.coverage_deg =
