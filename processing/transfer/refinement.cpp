@@ -260,8 +260,8 @@ private:
         return result;
     }
 
-    /// Sum over the four neighbours of the RMS difference to the source's own continuation, both ways. Not squared: what
-    /// counts is that a cut is there.
+    /// Sum over the four neighbours of the RMS difference to the source's own continuation, both ways. Not squared:
+    /// what counts is that a cut is there.
     float seams(cv::Point p, cv::Point source) const {
         constexpr std::array<std::array<int, 2>, 4> steps{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
         float sum = 0;
