@@ -9,7 +9,7 @@
 #include "processing/formats/exr.h"
 #include "processing/formats/picture.h"
 #include "processing/formats/png.h"
-#include "processing/formats/srgb.h"
+#include "processing/maps/srgb.h"
 
 namespace darkbox {
 namespace {

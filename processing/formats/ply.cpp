@@ -7,8 +7,8 @@
 
 #include "acquisition/frame/error.h"
 #include "processing/formats/atomic_file.h"
-#include "processing/formats/srgb.h"
 #include "processing/maps/require.h"
+#include "processing/maps/srgb.h"
 
 namespace darkbox {
 namespace {

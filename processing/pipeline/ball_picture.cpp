@@ -5,7 +5,7 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
-#include "processing/formats/srgb.h"
+#include "processing/maps/srgb.h"
 
 namespace darkbox {
 namespace {

@@ -1,6 +1,6 @@
 #include "processing/pipeline/default_relit.h"
 
-#include "processing/formats/srgb.h"
+#include "processing/maps/srgb.h"
 #include "processing/pipeline/steps.h"
 #include "processing/relight/relighter.h"
 

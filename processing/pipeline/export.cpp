@@ -10,7 +10,7 @@
 #include "processing/formats/light_files.h"
 #include "processing/formats/png.h"
 #include "processing/formats/ptm_file.h"
-#include "processing/formats/srgb.h"
+#include "processing/maps/srgb.h"
 #include "processing/pipeline/radiance.h"
 #include "processing/pipeline/session_files.h"
 #include "processing/pipeline/stack.h"

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "acquisition/frame/error.h"
-#include "processing/formats/srgb.h"
+#include "processing/maps/srgb.h"
 #include "processing/pipeline/stack.h"
 
 namespace darkbox {

@@ -9,8 +9,8 @@
 #include <string>
 
 #include "acquisition/frame/error.h"
-#include "processing/formats/srgb.h"
 #include "processing/maps/parallel.h"
+#include "processing/maps/srgb.h"
 #include "processing/pipeline/frame_rows.h"
 #include "processing/pipeline/open_files.h"
 #include "processing/pipeline/session_files.h"

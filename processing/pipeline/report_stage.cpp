@@ -11,7 +11,7 @@
 #include "processing/formats/map_files.h"
 #include "processing/formats/png.h"
 #include "processing/formats/report/report.h"
-#include "processing/formats/srgb.h"
+#include "processing/maps/srgb.h"
 #include "processing/pipeline/ball_picture.h"
 #include "processing/pipeline/default_relit.h"
 #include "processing/pipeline/false_colour.h"

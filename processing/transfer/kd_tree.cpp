@@ -20,6 +20,12 @@ bool before(const Match& a, const Match& b) {
     return std::pair(a.squared_distance, a.point) < std::pair(b.squared_distance, b.point);
 }
 
+/// With room for the rounding of sums of squares in two orders.
+bool may_be_nearer(float lower_bound, const Match& best) {
+    constexpr float rounding = 1e-4F;
+    return lower_bound * (1 - rounding) < best.squared_distance;
+}
+
 std::size_t leaves_for(std::size_t points) {
     std::size_t leaves = 1;
     while (leaves * leaf_size < points) leaves *= 2;
@@ -93,15 +99,21 @@ float KdTree::squared_distance_to_box(const float* query, std::size_t node) cons
     return sum;
 }
 
-void KdTree::read_leaf(const float* query, std::size_t leaf, std::size_t count, float squared_radius,
-                       std::vector<Match>& matches) const {
-    std::array<float, leaf_size> distances{};
+void KdTree::leaf_distances(const float* query, std::size_t leaf, float* distances) const {
+    std::array<float, leaf_size> sums{};
     const float* block = blocks_.data() + leaf * dimensions_ * leaf_size;
     for (std::size_t d = 0; d < dimensions_; ++d)
         for (std::size_t i = 0; i < leaf_size; ++i) {
             const float difference = block[d * leaf_size + i] - query[d];
-            distances[i] += difference * difference;
+            sums[i] += difference * difference;
         }
+    std::copy(sums.begin(), sums.end(), distances);
+}
+
+void KdTree::read_leaf(const float* query, std::size_t leaf, std::size_t count, float squared_radius,
+                       std::vector<Match>& matches) const {
+    std::array<float, leaf_size> distances{};
+    leaf_distances(query, leaf, distances.data());
     for (std::size_t i = 0; i < leaf_size; ++i) {
         const Match match{points_[leaf * leaf_size + i], distances[i]};
         if (match.point < 0 || !(match.squared_distance < limit_of(matches, count, squared_radius))) continue;
@@ -129,6 +141,32 @@ void KdTree::nearest(const float* query, std::size_t count, float squared_radius
         }
         read_leaf(query, node - leaves_, count, squared_radius, matches);
         ++leaves_read;
+    }
+}
+
+Match KdTree::nearest_by(const Distance& distance, const float* query, float squared_radius) const {
+    Match best{-1, squared_radius};
+    nearest_by(distance, query, 1, best);
+    return best;
+}
+
+void KdTree::nearest_by(const Distance& distance, const float* query, std::size_t node, Match& best) const {
+    if (node < leaves_) {
+        Bin near{squared_distance_to_box(query, 2 * node), 2 * node};
+        Bin far{squared_distance_to_box(query, 2 * node + 1), 2 * node + 1};
+        if (far < near) std::swap(near, far);
+        for (const Bin& bin : {near, far})
+            if (may_be_nearer(bin.first, best)) nearest_by(distance, query, bin.second, best);
+        return;
+    }
+    const std::size_t leaf = node - leaves_;
+    std::array<float, leaf_size> distances{};
+    leaf_distances(query, leaf, distances.data());
+    for (std::size_t i = 0; i < leaf_size; ++i) {
+        const int point = points_[leaf * leaf_size + i];
+        if (point < 0 || !may_be_nearer(distances[i], best)) continue;
+        const Match match{point, distance(point, best.squared_distance)};
+        if (match.squared_distance < best.squared_distance) best = match;
     }
 }
 

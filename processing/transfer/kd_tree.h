@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 namespace darkbox {
@@ -31,6 +32,13 @@ public:
     void nearest(const float* query, std::size_t count, float squared_radius, int most_leaves,
                  std::vector<Match>& matches) const;
 
+    /// The exact squared distance of a point, or anything not less than `squared_radius` where it is not nearer.
+    using Distance = std::function<float(int point, float squared_radius)>;
+
+    /// The nearest by another distance that is never less than the tree's, but for rounding: the tree's only tells what
+    /// need not be looked at. Exact, and as slow as that makes it. No point where none is within `squared_radius`.
+    Match nearest_by(const Distance& distance, const float* query, float squared_radius) const;
+
 private:
     std::size_t dimensions_;
     std::size_t leaves_;         ///< a power of two; leaf i is node leaves_ + i of the implicit tree with root 1
@@ -41,6 +49,8 @@ private:
     void build(const PointSet& points, std::vector<int>& order, std::size_t node, std::size_t begin, std::size_t end);
     void fill_leaf(const PointSet& points, const int* begin, const int* end, std::size_t leaf);
     float squared_distance_to_box(const float* query, std::size_t node) const;
+    void leaf_distances(const float* query, std::size_t leaf, float* distances) const;
+    void nearest_by(const Distance& distance, const float* query, std::size_t node, Match& best) const;
     void read_leaf(const float* query, std::size_t leaf, std::size_t count, float squared_radius,
                    std::vector<Match>& matches) const;
 };

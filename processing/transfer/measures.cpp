@@ -1,159 +1,207 @@
 #include "processing/transfer/measures.h"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <opencv2/imgproc.hpp>
-#include <vector>
+#include <fmt/format.h>
 
-#include "processing/transfer/nearest.h"
+#include <array>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "acquisition/frame/error.h"
+#include "processing/maps/parallel.h"
+#include "processing/maps/require.h"
+#include "processing/transfer/expected_look.h"
+#include "processing/transfer/patch_energy.h"
 
 namespace darkbox {
 namespace {
 
-constexpr int quantiles = 257;
-constexpr std::size_t coverage_samples = 4096;
-constexpr std::size_t patch_samples = 1024;
-
-std::vector<cv::Point> pixels_of(const cv::Mat1b& valid) {
-    std::vector<cv::Point> pixels;
-    cv::findNonZero(valid, pixels);
-    return pixels;
+void require_appearance(const char* whose, const NormalMap& normals, cv::Size picture) {
+    require_size(fmt::format("the {}'s mask", whose).c_str(), normals.valid.size(), normals.normal.size());
+    require_size(fmt::format("the {}'s picture", whose).c_str(), picture, normals.normal.size());
+    if (cv::countNonZero(normals.valid) == 0)
+        throw InputError(fmt::format("the {} has no valid pixel", whose),
+                         "check its mask: it must be white on the object");
 }
 
-/// Every n-th, so that about `count` are left.
-std::vector<cv::Point> thinned(const std::vector<cv::Point>& pixels, std::size_t count) {
-    std::vector<cv::Point> chosen;
-    const std::size_t stride = std::max<std::size_t>(1, pixels.size() / count);
-    for (std::size_t i = stride / 2; i < pixels.size(); i += stride) chosen.push_back(pixels[i]);
-    return chosen;
+void require_coordinates(const cv::Mat2i& coordinates, const cv::Mat1b& target, cv::Size source) {
+    require_size("the map of source coordinates", coordinates.size(), target.size());
+    for (int y = 0; y < target.rows; ++y)
+        for (int x = 0; x < target.cols; ++x) {
+            const cv::Point p(coordinates(y, x));
+            if (!target(y, x) || cv::Rect(cv::Point(0, 0), source).contains(p)) continue;
+            throw InputError(fmt::format("the source coordinate at ({}, {}) is ({}, {}), but the source is {} x {}", x,
+                                         y, p.x, p.y, source.width, source.height),
+                             "the coordinates must belong to this source and cover the whole target");
+        }
+}
+
+cv::Mat3b read_through(const cv::Mat3b& source, const cv::Mat2i& coordinates, const cv::Mat1b& valid) {
+    cv::Mat3b picture(valid.size(), cv::Vec3b(0, 0, 0));
+    for (int y = 0; y < valid.rows; ++y)
+        for (int x = 0; x < valid.cols; ++x)
+            if (valid(y, x)) picture(y, x) = source(cv::Point(coordinates(y, x)));
+    return picture;
+}
+
+/// The target's pixels whose normals the source has.
+cv::Mat1b known_pixels(const ExpectedLook& look, const NormalMap& target) {
+    cv::Mat1b known = target.valid.clone();
+    for (int y = 0; y < known.rows; ++y)
+        for (int x = 0; x < known.cols; ++x)
+            if (known(y, x) && !look.knows(target.normal(y, x))) known(y, x) = 0;
+    return known;
+}
+
+/// The mean of the valid pixels under a Gaussian; zero outside.
+cv::Mat3f blurred_within(const cv::Mat3f& picture, const cv::Mat1b& valid, double sigma) {
+    cv::Mat3f colour(picture.size(), cv::Vec3f(0, 0, 0));
+    cv::Mat1f weight;
+    picture.copyTo(colour, valid);
+    valid.convertTo(weight, CV_32F, 1 / 255.0);
+    cv::GaussianBlur(colour, colour, cv::Size(), sigma, sigma);
+    cv::GaussianBlur(weight, weight, cv::Size(), sigma, sigma);
+    for (int y = 0; y < picture.rows; ++y)
+        for (int x = 0; x < picture.cols; ++x)
+            colour(y, x) = valid(y, x) ? colour(y, x) * (1 / weight(y, x)) : cv::Vec3f(0, 0, 0);
+    return colour;
+}
+
+std::optional<double> colour_error(const ExpectedLook& look, const Appearance& target, const cv::Mat1b& known,
+                                   double sigma) {
+    const int pixels = cv::countNonZero(known);
+    if (pixels == 0) return std::nullopt;
+    cv::Mat3f expected(known.size(), cv::Vec3f(0, 0, 0));
+    for (int y = 0; y < known.rows; ++y)
+        for (int x = 0; x < known.cols; ++x)
+            if (known(y, x)) expected(y, x) = look.colour(target.normals.normal(y, x));
+    cv::Mat3f shown;
+    target.picture.convertTo(shown, CV_32F);
+    cv::Mat3f difference;
+    cv::subtract(blurred_within(shown, known, sigma), blurred_within(expected, known, sigma), difference);
+    double sum = 0;
+    for (int y = 0; y < known.rows; ++y)
+        for (int x = 0; x < known.cols; ++x)
+            if (known(y, x)) sum += std::sqrt(difference(y, x).dot(difference(y, x)) / 3.0);
+    return sum / pixels;
+}
+
+std::optional<double> sharpness(const ExpectedLook& look, const Appearance& target, const cv::Mat1b& known) {
+    const cv::Mat1f laplacian = squared_laplacian(target.picture);
+    const cv::Mat1b inner = inner_pixels(known, 1);
+    double shown = 0;
+    double expected = 0;
+    for (int y = 0; y < inner.rows; ++y)
+        for (int x = 0; x < inner.cols; ++x) {
+            if (!inner(y, x)) continue;
+            shown += static_cast<double>(laplacian(y, x));
+            expected += static_cast<double>(look.sharpness(target.normals.normal(y, x)));
+        }
+    if (!(expected > 0)) return std::nullopt;
+    return shown / expected;
+}
+
+/// Shares of the 256 values of L, a and b; each pixel counts as often as `weight` says.
+using LabHistogram = std::array<std::array<double, 256>, 3>;
+
+template <class Weight>
+LabHistogram lab_histogram(const cv::Mat3b& picture, const Weight& weight) {
+    cv::Mat3b lab;
+    cv::cvtColor(picture, lab, cv::COLOR_RGB2Lab);
+    LabHistogram histogram{};
+    double sum = 0;
+    for (int y = 0; y < lab.rows; ++y)
+        for (int x = 0; x < lab.cols; ++x) {
+            const double w = weight(y, x);
+            for (int c = 0; c < 3; ++c) histogram[c][lab(y, x)[c]] += w;
+            sum += w;
+        }
+    for (auto& channel : histogram)
+        for (double& share : channel) share /= sum;
+    return histogram;
+}
+
+double earth_movers_distance(const LabHistogram& a, const LabHistogram& b) {
+    double distance = 0;
+    for (std::size_t c = 0; c < a.size(); ++c) {
+        double difference = 0;
+        for (std::size_t value = 0; value < a[c].size(); ++value) {
+            difference += a[c][value] - b[c][value];
+            distance += std::abs(difference) / static_cast<double>(a.size());
+        }
+    }
+    return distance;
+}
+
+std::optional<double> histogram_distance(const ExpectedLook& look, const Appearance& source, const Appearance& target,
+                                         const cv::Mat1b& known) {
+    if (cv::countNonZero(known) == 0) return std::nullopt;
+    const cv::Mat1f use = look.expected_use(source, {target.normals.normal, known});
+    return earth_movers_distance(
+        lab_histogram(source.picture, [&](int y, int x) { return static_cast<double>(use(y, x)); }),
+        lab_histogram(target.picture, [&](int y, int x) { return known(y, x) ? 1.0 : 0.0; }));
+}
+
+TransferMeasures measured(const Appearance& source, const Appearance& target, const MeasureOptions& options) {
+    const ExpectedLook look(source);
+    const cv::Mat1b known = known_pixels(look, target.normals);
+    TransferMeasures m;
+    m.joint_energy = patch_energy(joint_patches(source, options.window), joint_patches(target, options.window),
+                                  options.window, options.stride);
+    m.patch_energy = patch_energy(colour_patches(source, options.window), colour_patches(target, options.window),
+                                  options.window, options.stride);
+    m.colour_error = colour_error(look, target, known, options.low_pass);
+    m.histogram_distance = histogram_distance(look, source, target, known);
+    m.sharpness = sharpness(look, target, known);
+    return m;
 }
 
 template <class Number>
-Number quantile(const std::vector<Number>& sorted, double share) {
-    const double position = share * static_cast<double>(sorted.size() - 1);
-    const auto below = static_cast<std::size_t>(position);
-    const auto above = std::min(below + 1, sorted.size() - 1);
-    const auto fraction = static_cast<Number>(position - static_cast<double>(below));
-    return sorted[below] * (1 - fraction) + sorted[above] * fraction;
-}
-
-/// Pixels whose whole patch is valid.
-std::vector<cv::Point> patch_centres(const cv::Mat1b& valid, int window) {
-    cv::Mat1b inside;
-    cv::erode(valid, inside, cv::Mat1b(window, window, std::uint8_t{1}), cv::Point(-1, -1), 1, cv::BORDER_CONSTANT,
-              cv::Scalar(0));
-    return pixels_of(inside);
-}
-
-void read_patch(const cv::Mat3f& albedo, cv::Point centre, int window, Feature& patch) {
-    patch.value.clear();
-    for (int dy = -(window / 2); dy <= window / 2; ++dy)
-        for (int dx = -(window / 2); dx <= window / 2; ++dx) {
-            const cv::Vec3f& v = albedo(centre.y + dy, centre.x + dx);
-            patch.value.insert(patch.value.end(), v.val, v.val + 3);
-        }
-    patch.value.resize((patch.value.size() + 7) / 8 * 8, 0.0F);
-    patch.known.assign(patch.value.size(), 1.0F);
-}
-
-/// The short list is the tree's: the exact nearest of it is within a fraction of a percent of the nearest of all.
-double squared_distance_to_nearest(const NearestFeatures& nearest, const NearestFeatures::Reader& reader,
-                                   const Feature& patch) {
-    std::vector<float> query;
-    std::vector<Match> matches;
-    Feature other;
-    float best = std::numeric_limits<float>::infinity();
-    nearest.short_list(patch, best, query, matches);
-    for (const Match& match : matches) {
-        reader(static_cast<std::size_t>(match.point), other);
-        best = std::min(best, squared_distance(patch, other));
-    }
-    return best;
-}
-
-std::vector<float> sorted_channel(const AlbedoMap& albedo, int channel) {
-    std::vector<float> values;
-    for (const cv::Point& p : pixels_of(albedo.valid)) values.push_back(albedo.albedo(p)[channel]);
-    std::sort(values.begin(), values.end());
-    return values;
+void require_range(const char* field, Number value, Number low, Number high) {
+    if (value >= low && value <= high) return;
+    throw InputError(fmt::format("measures: {} is {}, but it must be {}...{}", field, value, low, high),
+                     fmt::format("set {} within its range", field));
 }
 
 }  // namespace
 
-double coverage_deg(const NormalMap& source, const NormalMap& target) {
-    PointSet points;
-    points.dimensions = 3;
-    for (const cv::Point& p : pixels_of(source.valid))
-        points.coordinates.insert(points.coordinates.end(), source.normal(p).val, source.normal(p).val + 3);
-    const KdTree tree(points);
-    std::vector<double> angles;
-    std::vector<Match> matches;
-    for (const cv::Point& p : thinned(pixels_of(target.valid), coverage_samples)) {
-        tree.nearest(target.normal(p).val, 1, std::numeric_limits<float>::infinity(), std::numeric_limits<int>::max(),
-                     matches);
-        const double chord = std::sqrt(static_cast<double>(matches.front().squared_distance));
-        angles.push_back(2 * std::asin(std::min(1.0, chord / 2)) * 180 / std::numbers::pi);
-    }
-    std::sort(angles.begin(), angles.end());
-    return quantile(angles, 0.95);
+void MeasureOptions::validate() const {
+    require_range("window", window, 3, 15);
+    if (window % 2 == 0)
+        throw InputError(fmt::format("measures: window is {}, but it must be odd", window),
+                         "set window to an odd number of pixels, such as 5");
+    require_range("stride", stride, 1, 64);
+    require_range("low_pass", low_pass, 1.0, 64.0);
 }
 
-double coherence(const cv::Mat2i& coordinates) {
-    std::size_t pairs = 0;
-    std::size_t coherent = 0;
-    const auto count = [&](const cv::Vec2i& here, const cv::Vec2i& there, const cv::Vec2i& step) {
-        if (here[0] < 0 || there[0] < 0) return;
-        ++pairs;
-        if (there - here == step) ++coherent;
-    };
-    for (int y = 0; y < coordinates.rows; ++y)
-        for (int x = 0; x < coordinates.cols; ++x) {
-            if (x + 1 < coordinates.cols) count(coordinates(y, x), coordinates(y, x + 1), {1, 0});
-            if (y + 1 < coordinates.rows) count(coordinates(y, x), coordinates(y + 1, x), {0, 1});
-        }
-    return pairs == 0 ? 1.0 : static_cast<double>(coherent) / static_cast<double>(pairs);
+std::optional<double> histogram_distance(const Appearance& source, const Appearance& target) {
+    const ExpectedLook look(source);
+    return histogram_distance(look, source, target, known_pixels(look, target.normals));
 }
 
-double patch_energy(const AlbedoMap& source, const AlbedoMap& target, int window, float white) {
-    const std::vector<cv::Point> sources = patch_centres(source.valid, window);
-    const std::vector<cv::Point> targets = thinned(patch_centres(target.valid, window), patch_samples);
-    if (sources.empty() || targets.empty()) return 0;
-    const auto reader = [&](std::size_t i, Feature& patch) { read_patch(source.albedo, sources[i], window, patch); };
-    const NearestFeatures nearest(sources.size(), reader, 0);
-    double sum = 0;
-    Feature patch;
-    for (const cv::Point& p : targets) {
-        read_patch(target.albedo, p, window, patch);
-        sum += squared_distance_to_nearest(nearest, reader, patch);
-    }
-    const double numbers = static_cast<double>(targets.size()) * 3 * window * window;
-    return 255 / static_cast<double>(white) * std::sqrt(sum / numbers);
+TransferMeasures measure_picture(const Appearance& source, const Appearance& target, const MeasureOptions& options,
+                                 const WorkContext& work) {
+    options.validate();
+    require_appearance("source", source.normals, source.picture.size());
+    require_appearance("target", target.normals, target.picture.size());
+    return on_threads_of(work, [&] { return measured(source, target, options); });
 }
 
-double histogram_distance(const AlbedoMap& source, const AlbedoMap& target, float white) {
-    double sum = 0;
-    for (int channel = 0; channel < 3; ++channel) {
-        const std::vector<float> a = sorted_channel(source, channel);
-        const std::vector<float> b = sorted_channel(target, channel);
-        for (int i = 0; i < quantiles; ++i) {
-            const double share = static_cast<double>(i) / (quantiles - 1);
-            sum += std::abs(static_cast<double>(quantile(a, share)) - static_cast<double>(quantile(b, share)));
-        }
+TransferMeasures measure_coordinates(const Appearance& source, const NormalMap& target, const cv::Mat2i& coordinates,
+                                     const MeasureOptions& options, const WorkContext& work) {
+    require_coordinates(coordinates, target.valid, source.picture.size());
+    TransferMeasures m =
+        measure_picture(source, {target, read_through(source.picture, coordinates, target.valid)}, options, work);
+    m.seam = seam(source, target.valid, coordinates);
+    if (const std::optional<AngleMeasure> angle = angles(source.normals, target, coordinates)) {
+        m.angle_mean_deg = angle->mean_deg;
+        m.angle_p95_deg = angle->p95_deg;
     }
-    return 255 / static_cast<double>(white) * sum / (3 * quantiles);
-}
-
-float white_level(const AlbedoMap& albedo) {
-    std::vector<float> brightest;
-    for (const cv::Point& p : pixels_of(albedo.valid)) {
-        const cv::Vec3f& v = albedo.albedo(p);
-        brightest.push_back(std::max({v[0], v[1], v[2]}));
-    }
-    std::sort(brightest.begin(), brightest.end());
-    const float level = quantile(brightest, 0.99);
-    return level > 0 ? level : 1.0F;
+    cv::Mat2i inside(coordinates.size(), cv::Vec2i(-1, -1));
+    coordinates.copyTo(inside, target.valid);
+    m.coherence = coherence(inside);
+    m.cover = cover(source.normals.valid, target.valid, coordinates);
+    m.background = background(source.normals.valid, target.valid, coordinates);
+    return m;
 }
 
 }  // namespace darkbox

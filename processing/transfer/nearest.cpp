@@ -5,6 +5,7 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <limits>
 
 #include "processing/texels/random.h"
 
@@ -77,6 +78,13 @@ void NearestFeatures::short_list(const Feature& feature, float squared_radius, s
     query.resize(static_cast<std::size_t>(axes_.cols()));
     project(feature, query.data());
     tree_->nearest(query.data(), short_list_length, squared_radius, most_leaves, matches);
+}
+
+Match NearestFeatures::nearest(const Feature& feature, const KdTree::Distance& distance,
+                               std::vector<float>& query) const {
+    query.resize(static_cast<std::size_t>(axes_.cols()));
+    project(feature, query.data());
+    return tree_->nearest_by(distance, query.data(), std::numeric_limits<float>::infinity());
 }
 
 }  // namespace darkbox

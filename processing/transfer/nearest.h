@@ -26,6 +26,10 @@ public:
     void short_list(const Feature& feature, float squared_radius, std::vector<float>& query,
                     std::vector<Match>& matches) const;
 
+    /// The nearest of all by the exact distance, which `distance` tells; `query` is used again. The feature is
+    /// complete.
+    Match nearest(const Feature& feature, const KdTree::Distance& distance, std::vector<float>& query) const;
+
 private:
     Eigen::VectorXf mean_;
     Eigen::MatrixXf axes_;  ///< one column for each component

@@ -11,7 +11,9 @@
 #include "processing/maps/require.h"
 #include "processing/transfer/features.h"
 #include "processing/transfer/measures.h"
+#include "processing/transfer/patch_energy.h"
 #include "processing/transfer/pyramid.h"
+#include "processing/transfer/refinement.h"
 #include "processing/transfer/synthesis.h"
 
 namespace darkbox {
@@ -98,8 +100,12 @@ public:
 
     void begin_level() { before_ += std::exchange(rows_, 0); }
 
-    void rows_done(int rows) {
+    void check() const {
         if (work_.cancelled()) throw Cancelled("texture transfer was cancelled", "start it again when you like");
+    }
+
+    void rows_done(int rows) {
+        check();
         if (rows == rows_) return;
         rows_ = rows;
         work_.tell({"transfer", static_cast<std::size_t>(before_ + rows_), static_cast<std::size_t>(total_), {}});
@@ -112,8 +118,10 @@ private:
     int rows_ = 0;
 };
 
-cv::Mat2i synthesise(const MapPyramid& source, MapPyramid& target, const FeatureSpace& space,
+cv::Mat2i synthesise(const MapPyramid& source, MapPyramid& target, const FeatureSpace& space, float white,
                      const TransferOptions& options, const WorkContext& work) {
+    const MapLevel& finest = source.front();
+    const ExpectedLook look(appearance_of({finest.normal, finest.valid}, {finest.albedo, finest.valid}, white));
     Progress progress(work, target);
     cv::Mat2i coordinates;
     const int coarsest = static_cast<int>(source.size()) - 1;
@@ -124,6 +132,8 @@ cv::Mat2i synthesise(const MapPyramid& source, MapPyramid& target, const Feature
             {source[level], has_coarser ? &source[level + 1] : nullptr, target[level],
              has_coarser ? &target[level + 1] : nullptr, coordinates, std::ldexp(options.kappa, -level)},
             space, options.seed, [&](int rows) { progress.rows_done(rows); });
+        coordinates = refine_level({source[level], target[level], look, level, white}, coordinates, options,
+                                   [&] { progress.check(); });
     }
     return coordinates;
 }
@@ -155,14 +165,19 @@ TransferResult transferred(const TransferSource& source, const NormalMap& target
     const FeatureSpace space(options, white, mean_albedo(sources.front()));
 
     TransferResult result;
-    result.coordinates = synthesise(sources, targets, space, options, work);
+    result.coordinates = synthesise(sources, targets, space, white, options, work);
     result.albedo = read_albedo(source.albedo, result.coordinates, target.valid);
     result.index = read_index(source.index, result.coordinates, target.valid);
     result.coverage_deg =
         coverage_deg({sources.front().normal, sources.front().valid}, {targets.front().normal, targets.front().valid});
     result.coherence = coherence(result.coordinates);
-    result.patch_energy = patch_energy(exemplar, result.albedo, options.window, white);
-    result.histogram_distance = histogram_distance(exemplar, result.albedo, white);
+    const Appearance shown = appearance_of({sources.front().normal, sources.front().valid}, exemplar, white);
+    const Appearance moved = appearance_of(target, result.albedo, white);
+    constexpr int sparse = 16;  // so that it costs little next to the synthesis
+    result.patch_energy = patch_energy(colour_patches(shown, options.window), colour_patches(moved, options.window),
+                                       options.window, sparse)
+                              .value_or(0);
+    result.histogram_distance = histogram_distance(shown, moved).value_or(0);
     return result;
 }
 

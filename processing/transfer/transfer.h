@@ -9,13 +9,16 @@
 namespace darkbox {
 
 struct TransferOptions {
-    int window = 5;              ///< m: side of the window at the coarsest level and at the current level, odd, 3...15
-    int coarse_window = 3;       ///< n: side of the window in the level above, odd, 1...15
-    int levels = 0;              ///< pyramid levels; 0 = as many as keep the shorter side at 32 pixels or more
-    double kappa = 0.0;          ///< Hertzmann's coherence weight, 0...25; around 2 keeps stones and bricks whole
-    double normal_weight = 1.0;  ///< weight of normals against albedo in the feature, 0...100
-    double normal_sigma = 2.0;   ///< low-pass of the normals, pixels, 0...64
-    std::uint64_t seed = 1;      ///< picks the sample from which the search learns its axes
+    int window = 5;               ///< m: side of the window at the coarsest level and at the current level, odd, 3...15
+    int coarse_window = 3;        ///< n: side of the window in the level above, odd, 1...15
+    int levels = 0;               ///< pyramid levels; 0 = as many as keep the shorter side at 32 pixels or more
+    double kappa = 0.0;           ///< Hertzmann's coherence weight, 0...25; around 2 keeps stones and bricks whole
+    double normal_weight = 1.0;   ///< weight of normals against albedo in the feature, 0...100
+    double normal_sigma = 2.0;    ///< low-pass of the normals, pixels, 0...64
+    int passes = 6;               ///< refinement of each level, 0...64; 0 = Image Analogies as the thesis has them
+    double evenness = 1.0;        ///< refinement: how evenly the source is to be used, 0...100
+    double colour_weight = 0.25;  ///< refinement: weight of the colour that is expected for a normal, 0...100
+    std::uint64_t seed = 1;       ///< picks the sample from which the search learns its axes
 
     /// Throws InputError that names the field and the allowed range.
     void validate() const;

@@ -10,6 +10,7 @@ void add_import_command(CommandLine& line);
 void add_stage_commands(CommandLine& line);  ///< calibrate, normals, texels, shade, process, report
 void add_relight_command(CommandLine& line);
 void add_transfer_command(CommandLine& line);
+void add_measure_command(CommandLine& line);  ///< measure-transfer
 void add_evaluate_command(CommandLine& line);
 void add_drift_command(CommandLine& line);
 void add_session_commands(CommandLine& line);  ///< verify, export

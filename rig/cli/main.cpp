@@ -8,6 +8,7 @@ int main(int argc, char** argv) {
     darkbox::add_stage_commands(line);
     darkbox::add_relight_command(line);
     darkbox::add_transfer_command(line);
+    darkbox::add_measure_command(line);
     darkbox::add_evaluate_command(line);
     darkbox::add_drift_command(line);
     darkbox::add_session_commands(line);

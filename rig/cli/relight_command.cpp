@@ -6,7 +6,7 @@
 
 #include "acquisition/frame/error.h"
 #include "processing/formats/environment_file.h"
-#include "processing/formats/srgb.h"
+#include "processing/maps/srgb.h"
 #include "processing/pipeline/stages.h"
 #include "processing/pipeline/steps.h"
 #include "rig/cli/arguments.h"

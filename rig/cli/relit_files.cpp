@@ -10,7 +10,7 @@
 #include "processing/formats/atomic_file.h"
 #include "processing/formats/exr.h"
 #include "processing/formats/png.h"
-#include "processing/formats/srgb.h"
+#include "processing/maps/srgb.h"
 #include "processing/pipeline/steps.h"
 
 namespace darkbox {

@@ -8,7 +8,7 @@
 
 #include "processing/formats/exr.h"
 #include "processing/formats/png.h"
-#include "processing/formats/srgb.h"
+#include "processing/maps/srgb.h"
 #include "tests/support/test_data.h"
 #include "tests/support/throws.h"
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "acquisition/frame/error.h"
-#include "processing/formats/srgb.h"
+#include "processing/maps/srgb.h"
 #include "tests/processing/relight/sphere_scene.h"
 #include "tests/support/throws.h"
 

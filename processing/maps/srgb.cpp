@@ -1,4 +1,4 @@
-#include "processing/formats/srgb.h"
+#include "processing/maps/srgb.h"
 
 #include <algorithm>
 #include <cmath>
