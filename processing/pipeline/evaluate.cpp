@@ -177,7 +177,7 @@ void leave_lights_out(Bench& bench, const WorkContext& work, Evaluation& evaluat
             fmt::format("{} lights are too few to leave one out: the others could not tell normals", used));
         return;
     }
-    const std::vector<Predictor> predictors{lambert_predictor()};
+    const std::vector<Predictor> predictors = every_predictor();
     for (const Predictor& predictor : predictors) evaluation.predictors.push_back(predictor.name);
     evaluation.held_out = leave_one_light_out(bench.stack(), bench.lights(), bench.solve(Solver::robust), predictors,
                                               bench.solving_with(bench.solver()), work);
