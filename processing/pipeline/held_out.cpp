@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "acquisition/frame/error.h"
 #include "processing/pipeline/angular_error.h"
@@ -108,10 +109,12 @@ double mean_change_deg(const NormalMap& a, const NormalMap& b) {
 
 /// What darkbox would relight, made from the used lights alone.
 RelightScene scene_of(const PhotoStack& stack, const Lights& lights, const PhotometricStereoResult& solved,
-                      const WorkContext& work) {
-    RelightScene scene{solved.normals, solved.albedo, cluster_texels(solved.albedo, {}, work).index, {}};
-    scene.shading = shading_maps(stack, lights, scene.normals, scene.albedo, scene.index, {}, work).maps;
-    return scene;
+                      const SceneGeometry& geometry, const WorkContext& work) {
+    IndexMap index = cluster_texels(solved.albedo, {}, work).index;
+    ShadingOptions options;
+    options.geometry = geometry;
+    ShadingResult shaded = shading_maps(stack, lights, solved.normals, solved.albedo, index, options, work);
+    return {solved.normals, std::move(shaded.albedo), std::move(index), std::move(shaded.maps)};
 }
 
 /// Coordinates in the plane across `axis`; no value for a direction that does not meet it.
@@ -205,9 +208,10 @@ std::vector<HeldOutLight> leave_one_light_out(const PhotoStack& stack, const Lig
         const PhotometricStereoResult solved = photometric_stereo(stack, others, options, quietly);
         result.normal_change_deg = mean_change_deg(solved.normals, whole.normals);
         const cv::Mat1b kinds = kinds_of(stack, i, lights[i], reference, options.geometry);
-        const RelightScene scene = scene_of(stack, others, solved, quietly);
+        const RelightScene scene = scene_of(stack, others, solved, options.geometry, quietly);
         for (const Predictor& predictor : predictors) {
-            const auto predicted = predictor.predict({stack, others, scene, options.geometry}, lights[i], quietly);
+            const auto predicted =
+                predictor.predict({stack, others, solved, scene, options.geometry}, lights[i], quietly);
             result.errors.push_back(predicted ? compare(*predicted, stack.images[i], stack.clipped[i], kinds)
                                               : PredictionErrors{});
         }

@@ -9,13 +9,13 @@ namespace darkbox {
 namespace {
 
 cv::Mat3f lambert(const HeldOutTraining& training, const Light& light) {
-    const RelightScene& scene = training.scene;
-    const cv::Mat1d shading = lambert_shading(light, scene.normals, training.geometry);
+    const PhotometricStereoResult& solved = training.solved;
+    const cv::Mat1d shading = lambert_shading(light, solved.normals, training.geometry);
     cv::Mat3f image(training.stack.size(), cv::Vec3f::all(0));
     for (int y = 0; y < image.rows; ++y)
         for (int x = 0; x < image.cols; ++x) {
-            if (scene.normals.valid(y, x) == 0) continue;
-            const cv::Vec3f& albedo = scene.albedo.albedo(y, x);
+            if (solved.normals.valid(y, x) == 0) continue;
+            const cv::Vec3f& albedo = solved.albedo.albedo(y, x);
             for (int c = 0; c < 3; ++c)
                 image(y, x)[c] = static_cast<float>(albedo[c] * std::max(0.0, shading(y, x)) * light.intensity[c]);
         }

@@ -8,7 +8,7 @@
 
 #include "acquisition/frame/progress.h"
 #include "processing/maps/maps.h"
-#include "processing/normals/light_field.h"
+#include "processing/normals/photometric_stereo.h"
 #include "processing/relight/relight.h"
 
 namespace darkbox {
@@ -17,10 +17,11 @@ namespace darkbox {
 
 /// What a predictor may learn from.
 struct HeldOutTraining {
-    const PhotoStack& stack;        ///< the held-out photograph is in it, but its light is not `used`
-    const Lights& lights;           ///< `used` is false for the held-out one
-    const RelightScene& scene;      ///< normals, albedo, texels and shading maps, fitted to the used ones
-    const SceneGeometry& geometry;  ///< for near lights
+    const PhotoStack& stack;                ///< the held-out photograph is in it, but its light is not `used`
+    const Lights& lights;                   ///< `used` is false for the held-out one
+    const PhotometricStereoResult& solved;  ///< fitted to the used ones
+    const RelightScene& scene;              ///< as darkbox relights it: with texels and shading maps of the used ones
+    const SceneGeometry& geometry;          ///< for near lights
 };
 
 /// Draws the held-out photograph under `light`: linear radiance, of the stack's size; no value where the used lights do

@@ -3,6 +3,8 @@
 #include "acquisition/session/session.h"
 #include "processing/calibration/calibration.h"
 #include "processing/calibration/drift.h"
+#include "processing/normals/light_field.h"
+#include "processing/pipeline/session_files.h"
 
 namespace darkbox {
 
@@ -14,6 +16,10 @@ CalibrationOptions with_geometry(const Session& session, CalibrationOptions opti
 /// Where the rig's description has the lamps, as directions from the rig frame's origin at the object; for warnings.
 /// No value where the session does not know it.
 std::optional<RigLights> described_lights(const Session& session);
+
+/// Where the surface lies: as the session's results have it; where there are none, in the plane of the object. The
+/// session must be calibrated.
+SceneGeometry scene_geometry(const ResultFiles& files);
 
 /// Where the object's mask, if the session has one, has its centroid.
 std::optional<cv::Point2d> object_centroid(const Session& session);

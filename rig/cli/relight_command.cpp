@@ -33,7 +33,7 @@ RelightResult render(const RelightScene& scene, const RelightArguments& argument
 
 CommandResult run(const Arguments& arguments, const WorkContext& work) {
     require_outside_payload(arguments.out);
-    const RelightScene scene = load_scene(Session::open(arguments.session));
+    const RelightScene scene = load_shaded_scene(Session::open(arguments.session));
     const RelightResult relit = render(scene, arguments.relight, work);
     const double gain = viewing_gain(scene.albedo.albedo, scene.albedo.valid);
     write_relit(arguments.out, relit.image, gain);

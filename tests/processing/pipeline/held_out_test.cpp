@@ -108,6 +108,16 @@ TEST(HeldOut, PredictorsStandBesideEachOther) {
     EXPECT_GT(lights[0].errors[1][all]->rmse_relative, 1.0);  // a black picture misses all of the mean and more
 }
 
+TEST(HeldOut, ShadingMapsPredictALambertSphereExactly) {
+    const test::TexturedSphere scene = fully_lit_sphere();
+    const auto lights = leave_one_light_out(scene.stack, scene.lights, photometric_stereo(scene.stack, scene.lights),
+                                            every_predictor());
+    const double detail = mean_errors(lights, 1, LightGroup::every)[all]->rmse_relative;
+    EXPECT_LT(detail, 1e-4);
+    EXPECT_LT(detail, mean_errors(lights, 0, LightGroup::every)[all]->rmse_relative);
+    EXPECT_LT(detail, mean_errors(lights, 3, LightGroup::every)[all]->rmse_relative);
+}
+
 TEST(HeldOut, ShadowsHighlightsAndClippingAreToldApart) {
     test::TexturedSphere scene = fully_lit_sphere();
     const PhotometricStereoResult reference = photometric_stereo(scene.stack, scene.lights);
