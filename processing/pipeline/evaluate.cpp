@@ -8,14 +8,13 @@
 #include <utility>
 
 #include "acquisition/frame/error.h"
-#include "processing/formats/calibration_file.h"
-#include "processing/formats/exr.h"
 #include "processing/formats/json_file.h"
 #include "processing/formats/light_files.h"
 #include "processing/formats/map_files.h"
 #include "processing/normals/solver_names.h"
 #include "processing/pipeline/ideal_sphere.h"
 #include "processing/pipeline/session_files.h"
+#include "processing/pipeline/session_geometry.h"
 #include "processing/pipeline/solved.h"
 #include "processing/pipeline/stack.h"
 #include "processing/pipeline/stages.h"
@@ -76,14 +75,6 @@ Solver solver_of_results(const ResultFiles& files) {
                         [&] { return solver_named(json.at("solver").get<std::string>()); });
 }
 
-/// Where the surface lies: as the session's results have it; where there are none, in the plane of the object.
-SceneGeometry geometry_of(const ResultFiles& files) {
-    SceneGeometry geometry;
-    geometry.view = read_calibration(files.calibration).calibration.view;
-    if (geometry.view && fs::exists(files.height)) geometry.height_mm = read_exr_channel(files.height, "Y");
-    return geometry;
-}
-
 /// The session's photographs are read, and solved, only when something asks for them.
 class Bench {
 public:
@@ -91,7 +82,7 @@ public:
         : session_(session), options_(options), work_(work), files_(session.folder()) {
         lights_ = lights_without(load_lights(session), options.drop);
         solver_ = options.solver ? *options.solver : solver_of_results(files_);
-        geometry_ = geometry_of(files_);
+        geometry_ = scene_geometry(files_);
     }
 
     const Lights& lights() const { return lights_; }
@@ -177,7 +168,7 @@ void leave_lights_out(Bench& bench, const WorkContext& work, Evaluation& evaluat
             fmt::format("{} lights are too few to leave one out: the others could not tell normals", used));
         return;
     }
-    const std::vector<Predictor> predictors{lambert_predictor()};
+    const std::vector<Predictor> predictors = every_predictor();
     for (const Predictor& predictor : predictors) evaluation.predictors.push_back(predictor.name);
     evaluation.held_out = leave_one_light_out(bench.stack(), bench.lights(), bench.solve(Solver::robust), predictors,
                                               bench.solving_with(bench.solver()), work);

@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "acquisition/frame/error.h"
 #include "processing/pipeline/angular_error.h"
 #include "processing/pipeline/steps.h"
+#include "processing/shading/shading.h"
+#include "processing/texels/texels.h"
 
 namespace darkbox {
 namespace {
@@ -17,19 +20,6 @@ constexpr double highlight_share = 0.2;  // of the albedo, above what Lambert ex
 constexpr double hull_tolerance = 1e-6;  // of the plane's coordinates
 
 double mean_of(const cv::Vec3f& v) { return (static_cast<double>(v[0]) + v[1] + v[2]) / 3; }
-
-/// N.L of each valid pixel, of a near light times its fall-off there.
-cv::Mat1d shading_under(const Light& light, const NormalMap& normals, const SceneGeometry& geometry) {
-    cv::Mat1d shading(normals.normal.size(), 0.0);
-    for (int y = 0; y < shading.rows; ++y)
-        for (int x = 0; x < shading.cols; ++x) {
-            if (normals.valid(y, x) == 0) continue;
-            const cv::Vec3f& n = normals.normal(y, x);
-            const Incidence at = light.near ? incidence(light, geometry.point_at(y, x)) : Incidence{light.direction, 1};
-            shading(y, x) = at.direction.dot(Eigen::Vector3d(n[0], n[1], n[2])) * at.falloff;
-        }
-    return shading;
-}
 
 /// One pixel of a photograph as a light of intensity 1 would have made it, channel mean.
 double normalised(const cv::Vec3f& radiance, const Light& light) {
@@ -45,7 +35,7 @@ PixelKind kind_of(double observed, double shading, double albedo) {
 /// The kind of each pixel of one photograph, as an index into pixel_kinds; `all` (0) where nothing is compared.
 cv::Mat1b kinds_of(const PhotoStack& stack, std::size_t image, const Light& light,
                    const PhotometricStereoResult& reference, const SceneGeometry& geometry) {
-    const cv::Mat1d shading = shading_under(light, reference.normals, geometry);
+    const cv::Mat1d shading = lambert_shading(light, reference.normals, geometry);
     cv::Mat1b kinds(stack.size(), static_cast<uchar>(PixelKind::all));
     for (int y = 0; y < kinds.rows; ++y)
         for (int x = 0; x < kinds.cols; ++x) {
@@ -117,6 +107,16 @@ double mean_change_deg(const NormalMap& a, const NormalMap& b) {
     return angular_error(a, b).mean_deg;
 }
 
+/// What darkbox would relight, made from the used lights alone.
+RelightScene scene_of(const PhotoStack& stack, const Lights& lights, const PhotometricStereoResult& solved,
+                      const SceneGeometry& geometry, const WorkContext& work) {
+    IndexMap index = cluster_texels(solved.albedo, {}, work).index;
+    ShadingOptions options;
+    options.geometry = geometry;
+    ShadingResult shaded = shading_maps(stack, lights, solved.normals, solved.albedo, index, options, work);
+    return {solved.normals, std::move(shaded.albedo), std::move(index), std::move(shaded.maps)};
+}
+
 /// Coordinates in the plane across `axis`; no value for a direction that does not meet it.
 std::optional<cv::Point2f> gnomonic(const Eigen::Vector3d& direction, const Eigen::Vector3d& axis) {
     const double along = direction.dot(axis);
@@ -140,23 +140,6 @@ const char* name(PixelKind kind) {
             return "highlight";
     }
     return "";
-}
-
-Predictor lambert_predictor() {
-    return {"lambert", [](const HeldOutTraining& training, const Light& light) {
-                const PhotometricStereoResult& solved = training.solved;
-                const cv::Mat1d shading = shading_under(light, solved.normals, training.geometry);
-                cv::Mat3f image(training.stack.size(), cv::Vec3f::all(0));
-                for (int y = 0; y < image.rows; ++y)
-                    for (int x = 0; x < image.cols; ++x) {
-                        if (solved.normals.valid(y, x) == 0) continue;
-                        const cv::Vec3f& albedo = solved.albedo.albedo(y, x);
-                        for (int c = 0; c < 3; ++c)
-                            image(y, x)[c] =
-                                static_cast<float>(albedo[c] * std::max(0.0, shading(y, x)) * light.intensity[c]);
-                    }
-                return image;
-            }};
 }
 
 PredictionErrors mean_errors(const std::vector<HeldOutLight>& lights, std::size_t predictor, LightGroup group) {
@@ -211,6 +194,7 @@ std::vector<HeldOutLight> leave_one_light_out(const PhotoStack& stack, const Lig
                          "leaving one out needs at least four lights");
     const PhotometricStereoResult whole = photometric_stereo(stack, lights, options, work);
     const std::vector<bool> hull = on_hull(lights);
+    const WorkContext quietly{.report = {}, .stop = work.stop, .threads = work.threads};
     std::vector<HeldOutLight> results;
     for (std::size_t i = 0; i < lights.size(); ++i) {
         if (!lights[i].used) continue;
@@ -221,13 +205,16 @@ std::vector<HeldOutLight> leave_one_light_out(const PhotoStack& stack, const Lig
         Lights others = lights;
         others[i].used = false;
         if (!solvable(others)) continue;
-        const PhotometricStereoResult solved =
-            photometric_stereo(stack, others, options, {.report = {}, .stop = work.stop, .threads = work.threads});
+        const PhotometricStereoResult solved = photometric_stereo(stack, others, options, quietly);
         result.normal_change_deg = mean_change_deg(solved.normals, whole.normals);
         const cv::Mat1b kinds = kinds_of(stack, i, lights[i], reference, options.geometry);
-        for (const Predictor& predictor : predictors)
-            result.errors.push_back(compare(predictor.predict({stack, others, solved, options.geometry}, lights[i]),
-                                            stack.images[i], stack.clipped[i], kinds));
+        const RelightScene scene = scene_of(stack, others, solved, options.geometry, quietly);
+        for (const Predictor& predictor : predictors) {
+            const auto predicted =
+                predictor.predict({stack, others, solved, scene, options.geometry}, lights[i], quietly);
+            result.errors.push_back(predicted ? compare(*predicted, stack.images[i], stack.clipped[i], kinds)
+                                              : PredictionErrors{});
+        }
     }
     step(work, {"leaving lights out", lights.size(), lights.size(), ""});
     return results;

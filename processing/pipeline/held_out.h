@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstddef>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,28 +9,12 @@
 #include "acquisition/frame/progress.h"
 #include "processing/maps/maps.h"
 #include "processing/normals/photometric_stereo.h"
+#include "processing/pipeline/predictors.h"
 
 namespace darkbox {
 
 // Leave one light out: everything is fitted again without one photograph, the photograph is predicted from its light,
 // and compared with the real one. It needs no truth, so that it tells of real captures what angular errors cannot.
-
-/// What a predictor may learn from.
-struct HeldOutTraining {
-    const PhotoStack& stack;                ///< the held-out photograph is in it, but its light is not `used`
-    const Lights& lights;                   ///< `used` is false for the held-out one
-    const PhotometricStereoResult& solved;  ///< fitted to the used ones
-    const SceneGeometry& geometry;          ///< for near lights
-};
-
-/// Draws the held-out photograph under `light`: linear radiance, of the stack's size. Names as `--json` shows them.
-struct Predictor {
-    std::string name;
-    std::function<cv::Mat3f(const HeldOutTraining& training, const Light& light)> predict;
-};
-
-/// "lambert": albedo times max(0, N.L) times the light's intensity, of a near light as it arrives at the pixel.
-Predictor lambert_predictor();
 
 /// Every pixel of the object, and three kinds of them apart.
 enum class PixelKind {

@@ -196,7 +196,7 @@ void add_summary(const fs::path& file, const std::string& stage, ReportContent& 
 std::vector<fs::path> add_relit(const Session& session, const ResultFiles& files, ReportContent& content,
                                 const WorkContext& work) {
     std::vector<fs::path> written;
-    for (RelitPicture& picture : relight_by_default(load_scene(session), work)) {
+    for (RelitPicture& picture : relight_by_default(load_shaded_scene(session), work)) {
         written.push_back(files.results_folder / ("relit-" + picture.name + ".png"));
         write_png(written.back(), picture.image);
         content.relit.push_back({std::move(picture.image), picture.name, picture.caption});

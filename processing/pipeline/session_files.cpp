@@ -27,6 +27,7 @@ ResultFiles::ResultFiles(const fs::path& s)
       texels(s / "texels/texels.json"),
       shading(s / "shading/shading_maps.exr"),
       shading_json(s / "shading/shading.json"),
+      shading_albedo(s / "shading/albedo.exr"),
       shading_summary(s / "shading/summary.json"),
       results_folder(s / "results"),
       report(s / "report.html") {}

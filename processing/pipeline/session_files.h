@@ -25,7 +25,7 @@ struct ResultFiles {
     std::filesystem::path calibration, lights_lp, ball_picture, calibration_summary;
     std::filesystem::path normals, normals_png, albedo, albedo_png, confidence, height, surface, results_summary;
     std::filesystem::path index, texels;
-    std::filesystem::path shading, shading_json, shading_summary;
+    std::filesystem::path shading, shading_json, shading_albedo, shading_summary;
     std::filesystem::path results_folder, report;
 };
 

@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <opencv2/imgproc.hpp>
 
+#include "processing/formats/calibration_file.h"
+#include "processing/formats/exr.h"
 #include "processing/formats/picture.h"
 #include "processing/pipeline/session_files.h"
 
@@ -83,6 +86,14 @@ std::optional<RigLights> described_lights(const Session& session) {
         described.lights.push_back(light);
     }
     return described;
+}
+
+SceneGeometry scene_geometry(const ResultFiles& files) {
+    SceneGeometry geometry;
+    geometry.view = read_calibration(files.calibration).calibration.view;
+    if (geometry.view && std::filesystem::exists(files.height))
+        geometry.height_mm = read_exr_channel(files.height, "Y");
+    return geometry;
 }
 
 std::optional<cv::Point2d> object_centroid(const Session& session) {

@@ -3,6 +3,8 @@
 #include "acquisition/session/session.h"
 #include "processing/calibration/calibration.h"
 #include "processing/calibration/drift.h"
+#include "processing/normals/light_field.h"
+#include "processing/pipeline/session_files.h"
 
 namespace darkbox {
 
@@ -17,6 +19,10 @@ std::optional<RigLights> described_lights(const Session& session);
 
 /// What the session tells of camera and lamps but the calibration could not use, in words, with what would let it.
 std::vector<std::string> unused_geometry(const Session& session, const CalibrationOptions& options);
+
+/// Where the surface lies: as the session's results have it; where there are none, in the plane of the object. The
+/// session must be calibrated.
+SceneGeometry scene_geometry(const ResultFiles& files);
 
 /// Where the object's mask, if the session has one, has its centroid.
 std::optional<cv::Point2d> object_centroid(const Session& session);

@@ -100,7 +100,7 @@ struct ShadeSummary {
     std::size_t samples = 0;
     StageSeconds seconds;
 };
-/// Writes shading/shading_maps.exr, shading.json.
+/// Writes shading/shading_maps.exr, shading.json, albedo.exr (ShadingResult::albedo).
 ShadeSummary run_shade(const Session& session, const ShadingOptions& options = {}, const WorkContext& work = {});
 
 struct ReportSummary {
@@ -128,8 +128,10 @@ struct ProcessSummary {
 /// All stages in order, then the report.
 ProcessSummary run_process(const Session& session, const ProcessOptions& options = {}, const WorkContext& work = {});
 
-/// What relight and transfer need, from the session's results.
+/// What transfer needs, from the session's results: its albedo is the unshaded image.
 RelightScene load_scene(const Session& session);
+/// What relight needs: the same, but its albedo is that under the shading maps (ShadingResult::albedo).
+RelightScene load_shaded_scene(const Session& session);
 /// The lights of calibration/lights.json.
 Lights load_lights(const Session& session);
 

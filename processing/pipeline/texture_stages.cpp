@@ -3,6 +3,7 @@
 #include "processing/formats/json_file.h"
 #include "processing/formats/map_files.h"
 #include "processing/pipeline/session_files.h"
+#include "processing/pipeline/session_geometry.h"
 #include "processing/pipeline/stack.h"
 #include "processing/pipeline/stages.h"
 #include "processing/pipeline/steps.h"
@@ -66,7 +67,9 @@ ShadeSummary run_shade(const Session& session, const ShadingOptions& options, co
     const PhotoStack stack = load_stack(session, work);
     summary.seconds.read = watch.lap();
     step(work, {"measuring shading maps", 0, 1, ""});
-    const ShadingResult shaded = shading_maps(stack, lights, maps.normals, maps.albedo, index, options, work);
+    ShadingOptions with_geometry = options;
+    with_geometry.geometry = scene_geometry(files);
+    const ShadingResult shaded = shading_maps(stack, lights, maps.normals, maps.albedo, index, with_geometry, work);
     watch.lap();
     summary.seconds.solve = shaded.seconds;
     summary.texels = shaded.maps.texels;
@@ -75,6 +78,7 @@ ShadeSummary run_shade(const Session& session, const ShadingOptions& options, co
         std::accumulate(shaded.maps.samples.begin(), shaded.maps.samples.end(), std::size_t{0},
                         [](std::size_t sum, int samples) { return sum + static_cast<std::size_t>(samples); });
     write_shading_maps(files.shading, files.shading_json, shaded.maps);
+    write_albedo_map(files.shading_albedo, shaded.albedo);
     summary.seconds.write = watch.lap();
     write_json(files.shading_summary, to_json(summary));
     step(work, {"measuring shading maps", 1, 1, ""});
@@ -88,6 +92,14 @@ RelightScene load_scene(const Session& session) {
     require_made(files.shading, session, "shade");
     require_made(files.shading_json, session, "shade");
     scene.shading = read_shading_maps(files.shading, files.shading_json);
+    return scene;
+}
+
+RelightScene load_shaded_scene(const Session& session) {
+    const ResultFiles files(session.folder());
+    RelightScene scene = load_scene(session);
+    require_made(files.shading_albedo, session, "shade");
+    scene.albedo = read_albedo_map(files.shading_albedo, scene.normals.valid);
     return scene;
 }
 

@@ -9,17 +9,22 @@ namespace darkbox {
 struct GainCurve {
     std::vector<cv::Vec3d> gain;  ///< at least 0; 1 = Lambert
     std::vector<int> samples;     ///< behind each level; 0 where its gain comes from other levels
+
+    /// S(k, r) for an albedo of 1, by linear interpolation between the levels; r in 0...1.
+    cv::Vec3d shading(double r) const;
 };
 
-/// Samples of one texel re-sampled at the levels r_i = i / (levels - 1). A sample is set against its own pixel's
-/// albedo, so that a texel of mixed albedo, lit unevenly, does not take albedo for shading. The gain of a level is the
-/// least-squares factor of albedo x r over the samples within one level's distance, weighted by the hat about the
-/// level. Samples far below Lambert's prediction are shadowed and left out, unless the texel is that dark at all
-/// levels. Levels with thin data are interpolated in gain; beyond the last good level its gain holds, which scales the
-/// radiance with r. Thread-compatible.
+/// Fits one texel's S(k, r) to its samples. A sample is set against its own pixel's albedo, so that a texel of mixed
+/// albedo, lit unevenly, does not take albedo for shading. S is the piecewise linear function of r that misses the
+/// samples least (least squares on radiance: as relighting interpolates, so it is fitted), and neighbouring levels are
+/// tied to like gains as firmly as a few samples would: a gap is bridged linearly in gain, and beyond the last sample
+/// the gain holds, which scales the radiance with r.
+///
+/// Samples far below Lambert's prediction are shadowed and left out, unless the texel is that dark at all r; so are
+/// those between two levels where too few, or too few of them lit, were seen. Thread-compatible.
 class GainEstimator {
 public:
-    explicit GainEstimator(int levels) : lit_(levels), all_(levels) {}
+    explicit GainEstimator(int levels) : lit_(levels - 1), all_(levels - 1) {}
 
     /// One photograph's view of a pixel: `r` = N.L in (0, 1], `radiance` for a light of intensity 1.
     void add(double r, const cv::Vec3d& albedo, const cv::Vec3d& radiance);
@@ -27,21 +32,24 @@ public:
     GainCurve curve() const;
 
 private:
-    /// Normal equations of a level's one unknown per channel.
-    struct Fit {
-        cv::Vec3d radiance_by_lambert{0, 0, 0};
-        cv::Vec3d lambert_squared{0, 0, 0};
+    /// Normal equations of the gains at both ends of the interval between two levels.
+    struct Interval {
+        cv::Vec3d below_squared{0, 0, 0}, cross{0, 0, 0}, above_squared{0, 0, 0};
+        cv::Vec3d below_radiance{0, 0, 0}, above_radiance{0, 0, 0};
+        cv::Vec3d albedo_squared{0, 0, 0};
         int samples = 0;
-
-        void add(double weight, const cv::Vec3d& lambert, const cv::Vec3d& radiance);
-        cv::Vec3d gain() const;
+        int samples_above = 0;  ///< that have a share in the upper level
     };
 
     /// Enough samples, and enough of them not shadowed.
-    bool is_lit(std::size_t level) const;
+    bool is_lit(std::size_t interval) const;
+    /// A surface that is dark at every r is dark; one that is dark at some of them lies in shadow there.
+    bool is_dark_throughout() const;
+    /// The intervals' equations that count; without samples where they do not.
+    std::vector<Interval> measured() const;
 
-    std::vector<Fit> lit_;  ///< of samples that are not shadowed
-    std::vector<Fit> all_;
+    std::vector<Interval> lit_;  ///< of samples that are not shadowed
+    std::vector<Interval> all_;
 };
 
 }  // namespace darkbox

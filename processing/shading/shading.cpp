@@ -18,22 +18,23 @@ namespace {
 
 using Pixels = std::vector<cv::Point>;
 
+constexpr double smallest_evidence = 1e-4;  ///< sum of S(k, r)^2 for an albedo of 1 that tells a pixel's own albedo
+
 /// Everything a texel's samples are read from.
 struct Views {
     const PhotoStack& stack;
     const Lights& lights;
     const NormalMap& normals;
     const AlbedoMap& albedo;
+    const SceneGeometry& geometry;
 };
 
 bool is_finite(const cv::Vec3d& value) {
     return std::isfinite(value[0]) && std::isfinite(value[1]) && std::isfinite(value[2]);
 }
 
-cv::Vec3d to_opencv(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
-
-cv::Vec3d per_intensity(const cv::Vec3f& radiance, const Eigen::Vector3d& intensity) {
-    return {radiance[0] / intensity[0], radiance[1] / intensity[1], radiance[2] / intensity[2]};
+cv::Vec3d per_irradiance(const cv::Vec3f& radiance, const Eigen::Vector3d& irradiance) {
+    return {radiance[0] / irradiance[0], radiance[1] / irradiance[1], radiance[2] / irradiance[2]};
 }
 
 std::vector<Pixels> pixels_by_texel(const IndexMap& index, const AlbedoMap& albedo) {
@@ -52,24 +53,104 @@ cv::Vec3d mean_albedo(const AlbedoMap& albedo, const Pixels& pixels) {
     return pixels.empty() ? sum : sum * (1.0 / static_cast<double>(pixels.size()));
 }
 
-void add_samples(const Views& views, cv::Point pixel, GainEstimator& estimator) {
-    if (views.normals.valid(pixel) == 0) return;
-    const cv::Vec3d normal = views.normals.normal(pixel);
-    const cv::Vec3d albedo = views.albedo.albedo(pixel);
+/// Calls `sample(r, radiance for a light of intensity 1)` for each photograph that shows the pixel lit and not clipped.
+template <class Sample>
+void for_samples(const Views& views, cv::Point pixel, Sample&& sample) {
+    const cv::Vec3f& n = views.normals.normal(pixel);
+    if (views.normals.valid(pixel) == 0 || !is_finite(n)) return;
+    const Eigen::Vector3d normal(n[0], n[1], n[2]);
     for (std::size_t i = 0; i < views.lights.size(); ++i) {
         const Light& light = views.lights[i];
         if (!light.used || views.stack.clipped[i](pixel) != 0) continue;
-        const double r = normal.dot(to_opencv(light.direction));
+        const Incidence at =
+            light.near ? incidence(light, views.geometry.point_at(pixel.y, pixel.x)) : Incidence{light.direction, 1};
+        const double r = normal.dot(at.direction);
         if (!(r > 0)) continue;
-        const cv::Vec3d radiance = per_intensity(views.stack.images[i](pixel), light.intensity);
-        if (is_finite(radiance)) estimator.add(r, albedo, radiance);
+        const cv::Vec3d radiance = per_irradiance(views.stack.images[i](pixel), light.intensity * at.falloff);
+        if (is_finite(radiance)) sample(r, radiance);
     }
 }
 
-void measure_texel(const Views& views, const Pixels& pixels, int row, ShadingMaps& maps) {
-    GainEstimator estimator(maps.levels);
-    for (const cv::Point& pixel : pixels) add_samples(views, pixel, estimator);
-    const GainCurve curve = estimator.curve();
+GainCurve measured_curve(const Views& views, const Pixels& pixels, int levels) {
+    GainEstimator estimator(levels);
+    for (const cv::Point& pixel : pixels)
+        for_samples(views, pixel, [&, albedo = cv::Vec3d(views.albedo.albedo(pixel))](double r, const cv::Vec3d& seen) {
+            estimator.add(r, albedo, seen);
+        });
+    return estimator.curve();
+}
+
+/// What a pixel's samples say of its albedo under its texel's curve: least squares, per channel.
+struct Evidence {
+    cv::Vec3d by_radiance{0, 0, 0}, squared{0, 0, 0}, radiance_squared{0, 0, 0};
+    int samples = 0;
+
+    bool tells(int channel) const { return squared[channel] > smallest_evidence; }
+    double albedo(int channel) const { return std::max(0.0, by_radiance[channel] / squared[channel]); }
+    /// Sum of squares that the curve times that albedo leaves.
+    double left_over(int channel) const {
+        return std::max(0.0, radiance_squared[channel] - by_radiance[channel] * albedo(channel));
+    }
+};
+
+Evidence evidence_of(const GainCurve& curve, const Views& views, cv::Point pixel) {
+    Evidence evidence;
+    for_samples(views, pixel, [&](double r, const cv::Vec3d& radiance) {
+        const cv::Vec3d shading = curve.shading(r);
+        evidence.by_radiance += shading.mul(radiance);
+        evidence.squared += shading.mul(shading);
+        evidence.radiance_squared += radiance.mul(radiance);
+        ++evidence.samples;
+    });
+    return evidence;
+}
+
+/// How a texel's pixels differ in albedo, and how uncertainly each is told, in one channel.
+struct Spread {
+    double mean = 0;
+    double variance = 0;         ///< of the albedo itself, without what the samples' scatter makes of it
+    double sample_variance = 0;  ///< of one sample about the curve
+
+    Spread(const std::vector<Evidence>& pixels, int channel) {
+        double count = 0, left_over = 0, freedom = 0, uncertainty = 0;
+        for (const Evidence& pixel : pixels) {
+            if (!pixel.tells(channel)) continue;
+            mean += pixel.albedo(channel);
+            left_over += pixel.left_over(channel);
+            freedom += pixel.samples - 1;
+            uncertainty += 1 / pixel.squared[channel];
+            ++count;
+        }
+        if (!(count > 1 && freedom > 0)) return;
+        mean /= count;
+        sample_variance = left_over / freedom;
+        double scatter = 0;
+        for (const Evidence& pixel : pixels)
+            if (pixel.tells(channel)) scatter += std::pow(pixel.albedo(channel) - mean, 2);
+        variance = std::max(0.0, (scatter - sample_variance * uncertainty) / count);
+    }
+
+    /// The pixel's albedo drawn towards the texel's mean as far as it is uncertain (James and Stein 1961).
+    double albedo(const Evidence& pixel, int channel) const {
+        const double uncertain = sample_variance / pixel.squared[channel];
+        if (!(uncertain > 0)) return pixel.albedo(channel);
+        return mean + variance / (variance + uncertain) * (pixel.albedo(channel) - mean);
+    }
+};
+
+void measure_albedo(const GainCurve& curve, const Views& views, const Pixels& pixels, AlbedoMap& albedo) {
+    std::vector<Evidence> evidence;
+    for (const cv::Point& pixel : pixels) evidence.push_back(evidence_of(curve, views, pixel));
+    for (int c = 0; c < 3; ++c) {
+        const Spread spread(evidence, c);
+        for (std::size_t i = 0; i < pixels.size(); ++i)
+            if (evidence[i].tells(c)) albedo.albedo(pixels[i])[c] = static_cast<float>(spread.albedo(evidence[i], c));
+    }
+}
+
+void measure_texel(const Views& views, const Pixels& pixels, int row, ShadingResult& result) {
+    ShadingMaps& maps = result.maps;
+    const GainCurve curve = measured_curve(views, pixels, maps.levels);
     const cv::Vec3d mean = mean_albedo(views.albedo, pixels);
     maps.mean_albedo(row, 0) = mean;
     for (int level = 0; level < maps.levels; ++level) {
@@ -78,6 +159,7 @@ void measure_texel(const Views& views, const Pixels& pixels, int row, ShadingMap
             maps.radiance(row, level)[c] = static_cast<float>(std::max(0.0, mean[c]) * r * curve.gain[level][c]);
         maps.samples(row, level) = curve.samples[level];
     }
+    measure_albedo(curve, views, pixels, result.albedo);
 }
 
 /// The photographs are divided by them.
@@ -88,8 +170,17 @@ void require_intensities(const Lights& lights) {
                              "correct the intensity, or mark the light as not used");
 }
 
+/// A near light's direction depends on where the pixel lies.
+void require_geometry(const Lights& lights, const SceneGeometry& geometry, cv::Size size) {
+    for (const Light& light : lights)
+        if (light.used && light.near && !geometry.view)
+            throw InputError(fmt::format("the light of {} is near, but where the pixels lie is not known", light.file),
+                             "give the view: millimetres per pixel at the object");
+    if (!geometry.height_mm.empty()) require_size("the height map", geometry.height_mm.size(), size);
+}
+
 void require_inputs(const PhotoStack& stack, const Lights& lights, const NormalMap& normals, const AlbedoMap& albedo,
-                    const IndexMap& index) {
+                    const IndexMap& index, const SceneGeometry& geometry) {
     require_consistent(stack);
     if (lights.size() != stack.images.size())
         throw InputError(fmt::format("there are {} photographs but {} lights", stack.images.size(), lights.size()),
@@ -102,6 +193,7 @@ void require_inputs(const PhotoStack& stack, const Lights& lights, const NormalM
     require_size("the albedo map's mask", albedo.valid.size(), stack.size());
     require_size("the index map", index.label.size(), stack.size());
     require_labels(index);
+    require_geometry(lights, geometry, stack.size());
     if (index.texels < 1) throw InputError("the index map has no texels", "compute the texels first");
 }
 
@@ -118,7 +210,7 @@ ShadingResult shading_maps(const PhotoStack& stack, const Lights& lights, const 
                            const WorkContext& work) {
     const auto start = std::chrono::steady_clock::now();
     options.validate();
-    require_inputs(stack, lights, normals, albedo, index);
+    require_inputs(stack, lights, normals, albedo, index, options.geometry);
 
     ShadingResult result;
     ShadingMaps& maps = result.maps;
@@ -128,12 +220,14 @@ ShadingResult shading_maps(const PhotoStack& stack, const Lights& lights, const 
     maps.samples = cv::Mat1i(maps.texels, maps.levels);
     maps.mean_albedo = cv::Mat3f(maps.texels, 1);
 
-    const Views views{stack, lights, normals, albedo};
+    result.albedo = {albedo.albedo.clone(), albedo.valid.clone()};
+
+    const Views views{stack, lights, normals, albedo, options.geometry};
     const std::vector<Pixels> texels = pixels_by_texel(index, albedo);
     work.tell({"shading", 0, texels.size(), {}});
     on_threads_of(work, [&] {
         tbb::parallel_for(0, maps.texels, [&](int row) {
-            if (!work.cancelled()) measure_texel(views, texels[row], row, maps);
+            if (!work.cancelled()) measure_texel(views, texels[row], row, result);
         });
     });
     if (work.cancelled()) throw Cancelled("the shading maps were stopped", "start it again when it suits");

@@ -112,7 +112,7 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
     const std::vector<std::filesystem::path> names = picture_names(a.out, count_pictures(a));
     const LightingPlan plan(a, options);
 
-    const RelightScene scene = load_scene(Session::open(a.session));
+    const RelightScene scene = load_shaded_scene(Session::open(a.session));
     const PictureStyle style{viewing_gain(scene.albedo.albedo, scene.albedo.valid), a.bits};
     const Relighter relighter(scene, work);
     const Seconds seconds = write_pictures(names, plan, relighter, options, style, work);

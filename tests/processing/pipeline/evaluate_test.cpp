@@ -175,7 +175,7 @@ TEST_F(EvaluateSession, ABallAgainstTheSphereInItsMask) {
     EXPECT_FALSE(evaluation.comparison->second_is_better());
     EXPECT_LT(evaluation.lights->all.max_deg, 1e-3);
     EXPECT_EQ(evaluation.held_out.size(), 7u);
-    EXPECT_EQ(evaluation.predictors, std::vector<std::string>{"lambert"});
+    EXPECT_EQ(evaluation.predictors, (std::vector<std::string>{"darkbox_thesis", "darkbox_detail", "lambert", "ptm"}));
     EXPECT_FALSE(std::filesystem::exists(session.folder() / "results"));
 }
 

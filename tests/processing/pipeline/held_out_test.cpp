@@ -85,9 +85,9 @@ TEST(HeldOut, TheErrorIsRelativeToThePhotographsMean) {
 TEST(HeldOut, NothingOfTheHeldOutPhotographIsLearnt) {
     test::TexturedSphere scene = fully_lit_sphere();
     std::vector<cv::Mat3f> normals;
-    const Predictor spy{"spy", [&normals](const HeldOutTraining& training, const Light& light) {
-                            if (light.file == "ring-3.png") normals.push_back(training.solved.normals.normal.clone());
-                            return training.stack.images.front();
+    const Predictor spy{"spy", [&normals](const HeldOutTraining& training, const Light& light, const WorkContext&) {
+                            if (light.file == "ring-3.png") normals.push_back(training.scene.normals.normal.clone());
+                            return std::optional(training.stack.images.front());
                         }};
     const PhotometricStereoResult reference = photometric_stereo(scene.stack, scene.lights);
     leave_one_light_out(scene.stack, scene.lights, reference, {spy});
@@ -99,13 +99,23 @@ TEST(HeldOut, NothingOfTheHeldOutPhotographIsLearnt) {
 
 TEST(HeldOut, PredictorsStandBesideEachOther) {
     const test::TexturedSphere scene = fully_lit_sphere();
-    const Predictor black{"black", [](const HeldOutTraining& training, const Light&) {
-                              return cv::Mat3f(training.stack.size(), cv::Vec3f::all(0));
+    const Predictor black{"black", [](const HeldOutTraining& training, const Light&, const WorkContext&) {
+                              return std::optional(cv::Mat3f(training.stack.size(), cv::Vec3f::all(0)));
                           }};
     const auto lights = leave_one_light_out(scene.stack, scene.lights, photometric_stereo(scene.stack, scene.lights),
                                             {lambert_predictor(), black});
     ASSERT_EQ(lights[0].errors.size(), 2u);
     EXPECT_GT(lights[0].errors[1][all]->rmse_relative, 1.0);  // a black picture misses all of the mean and more
+}
+
+TEST(HeldOut, ShadingMapsPredictALambertSphereExactly) {
+    const test::TexturedSphere scene = fully_lit_sphere();
+    const auto lights = leave_one_light_out(scene.stack, scene.lights, photometric_stereo(scene.stack, scene.lights),
+                                            every_predictor());
+    const double detail = mean_errors(lights, 1, LightGroup::every)[all]->rmse_relative;
+    EXPECT_LT(detail, 1e-4);
+    EXPECT_LT(detail, mean_errors(lights, 0, LightGroup::every)[all]->rmse_relative);
+    EXPECT_LT(detail, mean_errors(lights, 3, LightGroup::every)[all]->rmse_relative);
 }
 
 TEST(HeldOut, ShadowsHighlightsAndClippingAreToldApart) {

@@ -115,15 +115,70 @@ TEST(ShadingMaps, SkipValuesThatAreNotNumbers) {
     EXPECT_LT(largest_difference_to_lambert(shade(sphere).maps), 1e-6);
 }
 
+TEST(ShadingMaps, TellTheAlbedoOfALambertSpheresPixels) {
+    TexturedSphere sphere = textured_sphere(60);
+    const AlbedoMap truth = {sphere.albedo.albedo.clone(), sphere.albedo.valid};
+    sphere.albedo.albedo(30, 30) *= 1.5;  // told wrong by whatever made the unshaded image
+    const AlbedoMap told = shade(sphere).albedo;
+    EXPECT_LT(cv::norm(told.albedo(cv::Rect(25, 25, 10, 10)), truth.albedo(cv::Rect(25, 25, 10, 10)), cv::NORM_INF),
+              0.01);
+}
+
+TEST(ShadingMaps, PassOverNormalsThatAreNotNumbers) {
+    TexturedSphere sphere = textured_sphere(60);
+    sphere.normals.normal(30, 30) = cv::Vec3f::all(std::nanf(""));
+    const ShadingResult shaded = shade(sphere);
+    EXPECT_LT(largest_difference_to_lambert(shaded.maps), 1e-6);
+    EXPECT_EQ(shaded.albedo.albedo(30, 30), sphere.albedo.albedo(30, 30));
+}
+
+TEST(ShadingMaps, OfOnePixelAreThatPixels) {
+    TexturedSphere sphere = textured_sphere(61);
+    const auto middle = [](const auto& map) { return map(cv::Rect(30, 30, 1, 1)).clone(); };
+    for (cv::Mat3f& image : sphere.stack.images) image = middle(image);
+    for (cv::Mat1b& clipped : sphere.stack.clipped) clipped = middle(clipped);
+    sphere.stack.mask = middle(sphere.stack.mask);
+    sphere.normals = {middle(sphere.normals.normal), middle(sphere.normals.valid)};
+    sphere.albedo = {middle(sphere.albedo.albedo), middle(sphere.albedo.valid)};
+    sphere.index = {cv::Mat1w(1, 1, std::uint16_t{1}), 1};
+    const ShadingResult shaded = shade(sphere);
+    EXPECT_LT(largest_difference_to_lambert(shaded.maps), 1e-6);
+    EXPECT_LT(cv::norm(shaded.albedo.albedo, sphere.albedo.albedo, cv::NORM_INF), 1e-5);
+}
+
+TEST(ShadingMaps, TakeANearLightAsItReachesThePixel) {
+    TexturedSphere sphere = textured_sphere(60);
+    ShadingOptions options;
+    options.geometry.view = ViewGeometry{1.0, {29.5, 29.5}};
+    for (std::size_t i = 0; i < sphere.lights.size(); ++i) {
+        Light& light = sphere.lights[i];
+        light.near = LampPosition{light.direction * 120, {0, 0, 0}};
+        for (int y = 0; y < 60; ++y)
+            for (int x = 0; x < 60; ++x) {
+                const Incidence at = incidence(light, options.geometry.point_at(y, x));
+                const cv::Vec3f& n = sphere.normals.normal(y, x);
+                const double r = std::max(0.0, at.direction.dot(Eigen::Vector3d(n[0], n[1], n[2])));
+                for (int c = 0; c < 3; ++c)
+                    sphere.stack.images[i](y, x)[c] =
+                        static_cast<float>(sphere.albedo.albedo(y, x)[c] * r * at.falloff * light.intensity[c]);
+            }
+    }
+    EXPECT_LT(largest_difference_to_lambert(shade(sphere, options).maps), 1e-6);
+    EXPECT_THROW(shade(sphere), InputError);
+}
+
 TEST(ShadingMaps, SameBitsOnAnyNumberOfThreads) {
     TexturedSphere sphere = textured_sphere(90);
     add_noise(sphere.stack, 0.02);
     WorkContext work;
     work.threads = 1;
-    const ShadingMaps one = shade(sphere, {}, work).maps;
+    const ShadingResult first = shade(sphere, {}, work);
+    const ShadingMaps& one = first.maps;
     for (const int threads : {2, 8}) {
         work.threads = threads;
-        const ShadingMaps many = shade(sphere, {}, work).maps;
+        const ShadingResult again = shade(sphere, {}, work);
+        const ShadingMaps& many = again.maps;
+        EXPECT_EQ(cv::norm(first.albedo.albedo, again.albedo.albedo, cv::NORM_INF), 0);
         EXPECT_EQ(cv::norm(one.radiance, many.radiance, cv::NORM_INF), 0);
         EXPECT_EQ(cv::norm(one.samples, many.samples, cv::NORM_INF), 0);
     }
