@@ -101,7 +101,8 @@ TEST(TransferErrors, CancellingStopsTheWork) {
         rows = update.done;
         if (rows >= 5) stop.request_stop();
     };
-    EXPECT_THROW(transfer_texture(stony_sphere(64), plane_normals({64, 64}), {}, work), Cancelled);
+    EXPECT_THROW(transfer_texture(stony_sphere(64), plane_normals({64, 64}), test::by(TransferMethod::analogies), work),
+                 Cancelled);
     EXPECT_LT(rows, 10U);
 }
 
