@@ -58,6 +58,7 @@ private:
     cv::Mat1f cost_;
     cv::Mat3f pull_;
     bool observed_ = false;
+    int seen_ = 0;
 
     cv::Mat3f smooth_cells(const cv::Mat3f& sums, const cv::Mat1f& counts) const;
     void expect_uses(const NormalTable& table);

@@ -1,5 +1,7 @@
 #include "processing/transfer/normal_table.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -62,6 +64,15 @@ int normal_bin(const cv::Vec3f& normal) {
     return cell(y) * normal_bin_side + cell(x);
 }
 
+cv::Mat1i normal_bin_map(const MapLevel& level) {
+    cv::Mat1i bins(level.valid.size(), -1);
+    tbb::parallel_for(0, bins.rows, [&](int y) {
+        for (int x = 0; x < bins.cols; ++x)
+            if (level.valid(y, x)) bins(y, x) = normal_bin(level.normal(y, x));
+    });
+    return bins;
+}
+
 cv::Vec3f bin_normal(int bin) {
     float x = centre(bin % normal_bin_side);
     float y = centre(bin / normal_bin_side);
@@ -78,11 +89,6 @@ NormalTable::NormalTable(const MapLevel& level) : first_(normal_bins + 1, 0) {
     std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
     each_valid(level, [&](int bin, cv::Point p) { pixels_[next[bin]++] = p; });
     nearest_filled_ = nearest_filled(first_);
-}
-
-cv::Point NormalTable::pick(const cv::Vec3f& normal, std::uint32_t random) const {
-    const std::span<const cv::Point> all = pixels(filled_bin(normal_bin(normal)));
-    return all[(std::uint64_t{random} * all.size()) >> 32];
 }
 
 }  // namespace darkbox

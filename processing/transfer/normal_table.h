@@ -18,6 +18,8 @@ constexpr int normal_bins = normal_bin_side * normal_bin_side;
 
 /// The bin of a unit normal.
 int normal_bin(const cv::Vec3f& normal);
+/// Of every valid pixel; -1 elsewhere.
+cv::Mat1i normal_bin_map(const MapLevel& level);
 /// The direction of a bin's middle.
 cv::Vec3f bin_normal(int bin);
 
@@ -36,8 +38,11 @@ public:
         return {pixels_.data() + first_[bin], pixels_.data() + first_[bin + 1]};
     }
 
-    /// One pixel of the filled bin nearest to the normal, told by a random number.
-    cv::Point pick(const cv::Vec3f& normal, std::uint32_t random) const;
+    /// One pixel of the filled bin nearest to a bin, told by a random number.
+    cv::Point pick(int bin, std::uint32_t random) const {
+        const std::span<const cv::Point> all = pixels(filled_bin(bin));
+        return all[(std::uint64_t{random} * all.size()) >> 32];
+    }
 
 private:
     std::vector<std::size_t> first_;

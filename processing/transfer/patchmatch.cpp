@@ -20,6 +20,7 @@ constexpr int default_levels = 3;
 constexpr int finest_passes = 4;
 constexpr int coarser_passes = 6;
 constexpr float vote_weight = 16;
+constexpr float cut_cost = 150;
 
 int passes_at(int level) { return level == 0 ? finest_passes : coarser_passes; }
 
@@ -40,6 +41,7 @@ public:
           source_bytes_(texel_bytes(source_, source.control_at(level), code)),
           target_bytes_(texel_bytes(target_, target.control_at(level), code)),
           table_(source_),
+          bin_(normal_bin_map(target_)),
           whole_(whole_windows(target_.valid, options.window)),
           balance_(source_, source_bytes_, target_, table_, level, balance_options(options)),
           next_(target_.valid.size()),
@@ -58,6 +60,7 @@ public:
         const Refinement refinement{source_,
                                     source_bytes_,
                                     table_,
+                                    bin_,
                                     target_,
                                     target_bytes_,
                                     whole_,
@@ -65,6 +68,7 @@ public:
                                     balance_,
                                     options_.window,
                                     vote_weight,
+                                    cut_cost,
                                     static_cast<float>(1 + options_.kappa),
                                     options_.seed * 4096 + static_cast<std::uint64_t>(level_ * 256 + number * 8)};
         for (int i = 0; i < 4; ++i) {
@@ -81,6 +85,7 @@ private:
     TexelBytes source_bytes_;
     TexelBytes target_bytes_;
     NormalTable table_;
+    cv::Mat1i bin_;
     cv::Mat1b whole_;
     TextureBalance balance_;
     cv::Mat2i coordinates_;

@@ -51,6 +51,7 @@ public:
         read_patch(p);
         take_vote(p);
         pull_ = r_.balance.pull(p.x, p.y);
+        read_continuations(p);
         best_ = cv::Point(r_.coordinates(p));
         least_ = cost(best_, std::numeric_limits<float>::infinity());
         tried_count_ = 0;
@@ -60,7 +61,7 @@ public:
         const auto random = [&](std::uint64_t n) {
             return counter_hash(static_cast<std::uint32_t>(p.x), static_cast<std::uint32_t>(p.y), r_.random + n);
         };
-        consider(r_.table.pick(r_.target.normal(p), random(0)), r_.incoherence);
+        consider(r_.table.pick(r_.bin(p), random(0)), r_.incoherence);
         for (std::uint64_t i = 1; i <= 2; ++i) consider(best_ + random_offset(random(i)), r_.incoherence);
         return {best_.x, best_.y};
     }
@@ -81,6 +82,7 @@ private:
     std::array<float, 3> vote_{};
     float vote_weight_ = 0;
     cv::Vec3f pull_;
+    std::array<cv::Point, 4> continued_;
     cv::Point best_;
     float least_ = 0;
     std::array<cv::Point, 24> tried_;
@@ -108,6 +110,15 @@ private:
                     std::fill_n(row + static_cast<std::ptrdiff_t>(i) * channels_, channels_, std::uint8_t{255});
         }
         return patch_.counts.data();
+    }
+
+    /// Where the patches of the four neighbours go on; nowhere for those outside, which nothing continues.
+    void read_continuations(cv::Point p) {
+        for (std::size_t i = 0; i < continued_.size(); ++i) {
+            const cv::Point offset = neighbours[i];
+            continued_[i] = r_.target.has(p + offset) ? cv::Point(r_.coordinates(p + offset)) - offset
+                                                      : cv::Point(std::numeric_limits<int>::min(), 0);
+        }
     }
 
     void take_vote(cv::Point p) {
@@ -158,6 +169,7 @@ private:
             const float off = value - vote_[static_cast<std::size_t>(c)];
             apart += vote_weight_ * off * off + pull_[c] * value;
         }
+        for (const cv::Point& continued : continued_) apart += source == continued ? 0 : r_.cut;
         if (apart >= limit) return apart;
         const float left = std::min(limit - apart, 1e9F);
         return apart + static_cast<float>(difference(source, static_cast<std::int32_t>(left) + 1));
@@ -188,17 +200,25 @@ private:
         return sum;
     }
 #else
-    HWY_INLINE std::int32_t rows_difference(const std::uint8_t* source, std::size_t stride, int begin, int end) const {
+    std::int32_t rows_difference(const std::uint8_t* source, std::size_t stride, int begin, int end) const {
+        return runs_ == 1 ? runs_difference<1>(source, stride, begin, end)
+                          : runs_difference<most_runs>(source, stride, begin, end);
+    }
+
+    /// `Most` runs of a row at most: the compiler unrolls what is known to be one.
+    template <int Most>
+    HWY_INLINE std::int32_t runs_difference(const std::uint8_t* source, std::size_t stride, int begin, int end) const {
         const Bytes bytes;
         const Words words;
         const Sums sums;
         auto even = hn::Zero(sums);
         auto odd = hn::Zero(sums);
-        const std::size_t length = static_cast<std::size_t>(runs_) * run;
-        for (int j = begin; j < end; ++j) {
+        const int runs = Most == 1 ? 1 : runs_;
+        const std::size_t length = static_cast<std::size_t>(runs) * run;
+        const std::uint8_t* t = patch_.value.data() + static_cast<std::size_t>(begin) * length;
+        const std::uint8_t* m = counts_ + static_cast<std::size_t>(begin) * length;
+        for (int j = begin; j < end; ++j, t += length, m += length) {
             const std::uint8_t* s = source + static_cast<std::size_t>(j) * stride;
-            const std::uint8_t* t = whole_row(patch_.value.data(), j);
-            const std::uint8_t* m = whole_row(counts_, j);
             for (std::size_t i = 0; i < length; i += hn::Lanes(bytes)) {
                 const auto a = hn::LoadU(bytes, s + i);
                 const auto b = hn::Load(bytes, t + i);

@@ -64,8 +64,8 @@ private:
         constexpr std::uint32_t middle = 0x80000000U;
         const auto offset = static_cast<float>(random(q, spacing, 1)) - static_cast<float>(middle);
         const auto jittered = static_cast<std::int64_t>(middle) + static_cast<std::int64_t>(offset * options_.jitter);
-        return table_.pick(target_.normal(q), static_cast<std::uint32_t>(std::clamp<std::int64_t>(
-                                                  jittered, 0, std::numeric_limits<std::uint32_t>::max())));
+        return table_.pick(normal_bin(target_.normal(q)), static_cast<std::uint32_t>(std::clamp<std::int64_t>(
+                                                              jittered, 0, std::numeric_limits<std::uint32_t>::max())));
     }
 };
 
