@@ -72,8 +72,7 @@ TextureBalance::TextureBalance(const MapLevel& source, const TexelBytes& source_
 }
 
 void TextureBalance::observe(const cv::Mat2i& coordinates, const TexelBytes& target_bytes) {
-    const float share = observed_ ? options_.hysteresis : 1;
-    observed_ = true;
+    const float share = 1 / static_cast<float>(++observations_);
     observe_usage(coordinates, share);
     observe_histograms(target_bytes, share);
     observe_colour(target_bytes);

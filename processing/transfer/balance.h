@@ -12,12 +12,11 @@ namespace darkbox {
 
 /// How strongly the balance pulls, in squared byte differences of a 5 x 5 patch.
 struct BalanceOptions {
-    float usage = 4000;       ///< for a source texel that is used as often as it should be
+    float usage = 6000;       ///< for a source texel that is used as often as it should be
     float most_usage = 8;     ///< times that: no more is added for what is used still more often
-    float histogram = 1500;   ///< per byte step of the distance between the histograms
+    float histogram = 1250;   ///< per byte step of the distance between the histograms
     float colour = 1;         ///< per squared byte of the difference of the smooth colours
     double smooth_sigma = 6;  ///< what counts as smooth, pixels of the finest level
-    float hysteresis = 0.5F;  ///< share of a change that is taken over at once: all pixels answer to it together
 };
 
 /// Keeps a synthesised texture as rich as its source. The normals alone tell what is expected: a source texel is
@@ -31,7 +30,8 @@ public:
     TextureBalance(const MapLevel& source, const TexelBytes& source_bytes, const MapLevel& target,
                    const NormalTable& table, int level, const BalanceOptions& options);
 
-    /// Takes the texture as it is now into account.
+    /// Takes the texture as it is now into account. Costs are means over all that was observed: all pixels answer to
+    /// them at once, and would swing from one extreme to the other with each pass.
     void observe(const cv::Mat2i& coordinates, const TexelBytes& target_bytes);
 
     /// What using a source texel costs more, for all of them.
@@ -57,8 +57,7 @@ private:
     std::array<Potential, 3> potential_{};
     cv::Mat1f cost_;
     cv::Mat3f pull_;
-    bool observed_ = false;
-    int seen_ = 0;
+    int observations_ = 0;
 
     cv::Mat3f smooth_cells(const cv::Mat3f& sums, const cv::Mat1f& counts) const;
     void expect_uses(const NormalTable& table);

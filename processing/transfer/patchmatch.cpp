@@ -17,10 +17,17 @@ namespace darkbox {
 namespace {
 
 constexpr int default_levels = 3;
-constexpr int finest_passes = 4;
+constexpr int finest_passes = 6;
 constexpr int coarser_passes = 6;
-constexpr float vote_weight = 16;
-constexpr float cut_cost = 150;
+
+/// Weights of what refine_row() adds up, for patches of 5 x 5 pixels.
+constexpr float vote_weight = 40;
+constexpr float cut_cost = 320;
+
+/// The last pass of all closes seams: cuts and votes count more, and nothing new comes in but where it is far better.
+constexpr float last_vote_weight = 1.5F * vote_weight;
+constexpr float last_cut_cost = 4 * cut_cost;
+constexpr float last_incoherence = 100;
 
 int passes_at(int level) { return level == 0 ? finest_passes : coarser_passes; }
 
@@ -57,6 +64,8 @@ public:
 
     void pass(int number) {
         balance_.observe(coordinates_, target_bytes_);
+        const bool last = level_ == 0 && number == passes_at(0) - 1;
+        const float patches = patches_of(options_);
         const Refinement refinement{source_,
                                     source_bytes_,
                                     table_,
@@ -67,9 +76,9 @@ public:
                                     coordinates_,
                                     balance_,
                                     options_.window,
-                                    vote_weight,
-                                    cut_cost,
-                                    static_cast<float>(1 + options_.kappa),
+                                    (last ? last_vote_weight : vote_weight) * patches,
+                                    (last ? last_cut_cost : cut_cost) * patches,
+                                    last ? last_incoherence : static_cast<float>(1 + options_.kappa),
                                     options_.seed * 4096 + static_cast<std::uint64_t>(level_ * 256 + number * 8)};
         for (int i = 0; i < 4; ++i) {
             const int pixel_class = number % 2 == 0 ? i : 3 - i;
@@ -93,9 +102,14 @@ private:
     const TransferOptions& options_;
     int level_;
 
+    /// How many times larger than 5 x 5 a patch is.
+    static float patches_of(const TransferOptions& options) {
+        return static_cast<float>(options.window * options.window) / 25;
+    }
+
     static BalanceOptions balance_options(const TransferOptions& options) {
         BalanceOptions balance;
-        const auto patches = static_cast<float>(options.window * options.window) / 25;
+        const float patches = patches_of(options);
         balance.usage *= patches;
         balance.histogram *= patches;
         balance.colour *= patches;

@@ -10,6 +10,7 @@
 // Highway compiles this file once for each kind of processor.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "processing/transfer/refine_row.cpp"
+#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -48,6 +49,12 @@ public:
     }
 
     cv::Vec2i pixel(cv::Point p) {
+        const auto random = [&](std::uint64_t n) {
+            return counter_hash(static_cast<std::uint32_t>(p.x), static_cast<std::uint32_t>(p.y), r_.random + n);
+        };
+        // Far away in memory: asked for now, needed only later.
+        const cv::Point alike = r_.table.pick(r_.bin(p), random(0));
+        hwy::Prefetch(r_.source_bytes.at(alike));
         read_patch(p);
         take_vote(p);
         pull_ = r_.balance.pull(p.x, p.y);
@@ -58,10 +65,7 @@ public:
         tried_[tried_count_++] = best_;
         for (const cv::Point& offset : neighbours)
             if (r_.target.has(p + offset)) consider(cv::Point(r_.coordinates(p + offset)) - offset, 1);
-        const auto random = [&](std::uint64_t n) {
-            return counter_hash(static_cast<std::uint32_t>(p.x), static_cast<std::uint32_t>(p.y), r_.random + n);
-        };
-        consider(r_.table.pick(r_.bin(p), random(0)), r_.incoherence);
+        consider(alike, r_.incoherence);
         for (std::uint64_t i = 1; i <= 2; ++i) consider(best_ + random_offset(random(i)), r_.incoherence);
         return {best_.x, best_.y};
     }

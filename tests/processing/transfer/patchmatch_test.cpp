@@ -134,13 +134,14 @@ TEST(Patchmatch, IsBetterThanItsSeeds) {
     const TransferResult seeds = transfer_texture(source, target, by(TransferMethod::preview));
     const TransferResult refined = transfer_texture(source, target, by(TransferMethod::patchmatch));
     EXPECT_LT(refined.patch_energy, 0.8 * seeds.patch_energy);
-    EXPECT_LT(refined.histogram_distance, 10);
 }
 
 TEST(Patchmatch, UsesMostOfWhatItCouldUse) {
     const TransferSource source = stony(plane_normals({96, 96}), 150, 3);
     const TransferResult result = transfer_texture(source, plane_normals({128, 128}), by(TransferMethod::patchmatch));
     EXPECT_GT(cover(source, result.coordinates), 0.6);
+    // Both face the viewer all over: the target's colours should be the source's.
+    EXPECT_LT(result.histogram_distance, 5);
 }
 
 TEST(Patchmatch, SeedsDiffer) {
