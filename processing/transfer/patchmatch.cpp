@@ -22,7 +22,7 @@ constexpr int coarser_passes = 6;
 
 /// Weights of what refine_row() adds up, for patches of 5 x 5 pixels.
 constexpr float vote_weight = 40;
-constexpr float cut_cost = 320;
+constexpr float cut_cost = 340;
 
 /// The last pass of all closes seams: cuts and votes count more, and nothing new comes in but where it is far better.
 constexpr float last_vote_weight = 1.5F * vote_weight;

@@ -12,7 +12,7 @@ namespace {
 /// Codes of white albedo and of a unit normal's component at equal weights. That white is about as far from black as
 /// the normal of a plane from one at its side makes colours and normals of a transferred texture equally wrong; and
 /// there is head-room for what is brighter than white.
-constexpr double white_code = 124;
+constexpr double white_code = 127;
 constexpr double unit_code = 127.5;
 constexpr int steps = 4096;
 constexpr double highest = 2;  ///< times white; what is brighter yet is cut

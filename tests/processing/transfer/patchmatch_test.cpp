@@ -144,6 +144,54 @@ TEST(Patchmatch, UsesMostOfWhatItCouldUse) {
     EXPECT_LT(result.histogram_distance, 5);
 }
 
+/// A wall on a sphere: courses of bricks of different reds, light joints of two pixels between them.
+constexpr int course = 16;
+
+TransferSource brick_sphere(int side) {
+    const NormalMap normals = sphere_normals(side);
+    TransferSource source{normals, {cv::Mat3f(side, side, cv::Vec3f(0, 0, 0)), normals.valid.clone()}, {}};
+    for (int y = 0; y < side; ++y)
+        for (int x = 0; x < side; ++x) {
+            if (!normals.valid(y, x)) continue;
+            const int along = x + (y / course % 2) * course;
+            const bool joint = y % course < 2 || along % (2 * course) < 2;
+            const float red = 0.35F + 0.05F * static_cast<float>((y / course * 7 + along / (2 * course) * 3) % 4);
+            source.albedo.albedo(y, x) =
+                joint ? cv::Vec3f(0.6F, 0.58F, 0.55F) : cv::Vec3f(red, 0.3F * red, 0.15F * red);
+        }
+    return source;
+}
+
+/// Of the target's pixels on a bed joint, the share whose right-hand neighbour goes on with it, give or take a pixel.
+double unbroken_courses(const cv::Mat2i& coordinates) {
+    int on_joint = 0;
+    int unbroken = 0;
+    for (int y = 0; y < coordinates.rows; ++y)
+        for (int x = 1; x < coordinates.cols; ++x) {
+            if (coordinates(y, x - 1)[1] % course >= 2) continue;
+            ++on_joint;
+            const int next = coordinates(y, x)[1] % course;
+            if (next <= 2 || next == course - 1) ++unbroken;
+        }
+    return static_cast<double>(unbroken) / on_joint;
+}
+
+TEST(Patchmatch, BricksKeepTheirCourses) {
+    const TransferSource source = brick_sphere(256);
+    NormalMap hills = plane_normals({256, 256});
+    for (int y = 0; y < 256; ++y)
+        for (int x = 0; x < 256; ++x) {
+            const cv::Vec3d n(0.6 * std::sin(x * 0.04), 0.6 * std::cos(y * 0.035), 1);
+            hills.normal(y, x) = n / cv::norm(n);
+        }
+    const TransferResult seeds = transfer_texture(source, hills, by(TransferMethod::preview));
+    const TransferResult refined = transfer_texture(source, hills, by(TransferMethod::patchmatch));
+    RecordProperty("unbroken_preview", std::to_string(unbroken_courses(seeds.coordinates)));
+    RecordProperty("unbroken_patchmatch", std::to_string(unbroken_courses(refined.coordinates)));
+    EXPECT_GT(unbroken_courses(refined.coordinates), 0.97);
+    EXPECT_GT(unbroken_courses(refined.coordinates), unbroken_courses(seeds.coordinates));
+}
+
 TEST(Patchmatch, SeedsDiffer) {
     const TransferSource source = stony_sphere(64);
     const NormalMap target = wavy_normals({64, 64});
