@@ -12,16 +12,15 @@ namespace {
 /// Forgets the process's peak of memory so far.
 void reset_peak() { std::ofstream("/proc/self/clear_refs") << "5"; }
 
-/// Resident memory in MiB: "VmHWM:" at its peak, "VmRSS:" now.
-double resident_mib(const std::string& wanted) {
+double peak_mib() {
     std::ifstream status("/proc/self/status");
     for (std::string word; status >> word;)
-        if (double kib = 0; word == wanted && status >> kib) return kib / 1024;
+        if (double kib = 0; word == "VmHWM:" && status >> kib) return kib / 1024;
     return 0;
 }
 
-/// Stones on a sphere moved onto waves of the same size; on `threads` threads. `peak_MiB` is what the transfer adds to
-/// its input.
+/// Stones on a sphere moved onto waves of the same size; on `threads` threads. `peak_MiB` is the
+/// whole process's, with what earlier benchmarks left in it: run one at a time for the transfer's own.
 void transfer(benchmark::State& state, TransferMethod method) {
     const int side = static_cast<int>(state.range(0));
     const TransferSource source = test::stony(test::sphere_normals(side), 200, 7);
@@ -30,12 +29,11 @@ void transfer(benchmark::State& state, TransferMethod method) {
     options.kappa = static_cast<double>(state.range(2));
     TransferResult result;
     reset_peak();
-    const double before = resident_mib("VmRSS:");
     for (auto _ : state) {
         result = test::transferred_on(static_cast<int>(state.range(1)), source, target, options);
         state.SetIterationTime(result.seconds);
     }
-    state.counters["peak_MiB"] = resident_mib("VmHWM:") - before;
+    state.counters["peak_MiB"] = peak_mib();
     state.counters["us_per_pixel"] = result.seconds * 1e6 / side / side;
     state.counters["coherence"] = result.coherence;
     state.counters["patch_energy"] = result.patch_energy;

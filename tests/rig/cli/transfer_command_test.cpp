@@ -67,7 +67,7 @@ TEST_F(TransferCommand, CarriesAnyMapOverInItsOwnFormat) {
         const cv::Mat1f radiance = read_exr_channel(at("out/applied-radiance.exr"), "L");
         for (int y = 0; y < side; ++y)
             for (int x = 0; x < side; ++x) {
-                const cv::Vec2i from = coordinates(y, x);
+                const cv::Vec2i& from = coordinates(y, x);
                 ASSERT_GE(from[0], 0);
                 EXPECT_EQ(places.at<cv::Vec3w>(y, x), places_(from[1], from[0]));
                 EXPECT_EQ(radiance(y, x), 1000.5F * static_cast<float>(from[0]) + static_cast<float>(from[1]));
