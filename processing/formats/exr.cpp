@@ -209,6 +209,12 @@ cv::Mat1f read_exr_channel(const fs::path& path, const std::string& channel) {
     return *found;
 }
 
+std::vector<ExrChannel> read_exr_channels(const fs::path& path) {
+    std::vector<ExrChannel> channels = decode_exr(read_file(path), path.string(), most_pixels);
+    if (channels.empty()) throw bad_picture(path.string(), "has no channel of full size");
+    return channels;
+}
+
 cv::Mat3f read_exr_colour(const fs::path& path) {
     return colour_of(decode_exr(read_file(path), path.string(), most_pixels), path.string());
 }

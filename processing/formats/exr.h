@@ -33,6 +33,8 @@ void write_exr_rows(const std::filesystem::path& path, cv::Size size, const std:
 cv::Mat1f read_exr_channel(const std::filesystem::path& path, const std::string& channel);
 /// The same; no value when there is no such channel.
 std::optional<cv::Mat1f> find_exr_channel(const std::filesystem::path& path, const std::string& channel);
+/// Every channel by name, at least one.
+std::vector<ExrChannel> read_exr_channels(const std::filesystem::path& path);
 /// R, G, B, or Y replicated; values as stored, not checked for NaN.
 cv::Mat3f read_exr_colour(const std::filesystem::path& path);
 

@@ -32,6 +32,8 @@ void TransferOptions::validate() const {
     require_range("passes", passes, 0, 64);
     require_range("evenness", evenness, 0.0, 100.0);
     require_range("colour_weight", colour_weight, 0.0, 100.0);
+    require_range("jitter", jitter, 0.0, 1.0);
+    require_range("control_weight", control_weight, 0.0, 100.0);
     require_range("normal_sigma", normal_sigma, 0.0, 64.0);
 }
 

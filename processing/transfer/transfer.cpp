@@ -4,17 +4,18 @@
 
 #include <chrono>
 #include <cmath>
-#include <utility>
 
 #include "acquisition/frame/error.h"
 #include "processing/maps/parallel.h"
 #include "processing/maps/require.h"
-#include "processing/transfer/features.h"
+#include "processing/transfer/analogies.h"
+#include "processing/transfer/coverage.h"
 #include "processing/transfer/measures.h"
 #include "processing/transfer/patch_energy.h"
+#include "processing/transfer/patchmatch.h"
+#include "processing/transfer/preview.h"
 #include "processing/transfer/pyramid.h"
-#include "processing/transfer/refinement.h"
-#include "processing/transfer/synthesis.h"
+#include "processing/transfer/relief.h"
 
 namespace darkbox {
 namespace {
@@ -71,6 +72,18 @@ void require_input(const TransferSource& source, const NormalMap& target) {
     require_any("target", target.valid);
 }
 
+void require_control(const ControlMaps& control, const TransferSource& source, const NormalMap& target,
+                     const TransferOptions& options) {
+    if (control.source.empty() && control.target.empty()) return;
+    if (options.method != TransferMethod::patchmatch)
+        throw InputError("control maps guide the method patchmatch only", "choose that method, or leave them out");
+    require_size("the source's control map", control.source.size(), source.normals.valid.size());
+    require_size("the target's control map", control.target.size(), target.valid.size());
+    for (const cv::Mat3f* map : {&control.source, &control.target})
+        if (!cv::checkRange(*map))
+            throw InputError("a control map has values that are not finite", "draw it again, with values of 0...1");
+}
+
 /// Both of the source's maps over the pixels where both are valid.
 MapLevel source_level(const TransferSource& source, double sigma) {
     NormalMap normals = source.normals;
@@ -84,58 +97,6 @@ MapLevel source_level(const TransferSource& source, double sigma) {
 MapLevel target_level(const NormalMap& target, double sigma) {
     const NormalMap smooth = low_pass(target, sigma);
     return {smooth.normal, cv::Mat3f(smooth.normal.size(), cv::Vec3f(0, 0, 0)), smooth.valid};
-}
-
-cv::Vec3f mean_albedo(const MapLevel& level) {
-    const cv::Scalar mean = cv::mean(level.albedo, level.valid);
-    return {static_cast<float>(mean[0]), static_cast<float>(mean[1]), static_cast<float>(mean[2])};
-}
-
-/// Tells each finished row of each level once, and stops the work when that is asked for.
-class Progress {
-public:
-    Progress(const WorkContext& work, const MapPyramid& target) : work_(work) {
-        for (const MapLevel& level : target) total_ += level.valid.rows;
-    }
-
-    void begin_level() { before_ += std::exchange(rows_, 0); }
-
-    void check() const {
-        if (work_.cancelled()) throw Cancelled("texture transfer was cancelled", "start it again when you like");
-    }
-
-    void rows_done(int rows) {
-        check();
-        if (rows == rows_) return;
-        rows_ = rows;
-        work_.tell({"transfer", static_cast<std::size_t>(before_ + rows_), static_cast<std::size_t>(total_), {}});
-    }
-
-private:
-    const WorkContext& work_;
-    int total_ = 0;
-    int before_ = 0;
-    int rows_ = 0;
-};
-
-cv::Mat2i synthesise(const MapPyramid& source, MapPyramid& target, const FeatureSpace& space, float white,
-                     const TransferOptions& options, const WorkContext& work) {
-    const MapLevel& finest = source.front();
-    const ExpectedLook look(appearance_of({finest.normal, finest.valid}, {finest.albedo, finest.valid}, white));
-    Progress progress(work, target);
-    cv::Mat2i coordinates;
-    const int coarsest = static_cast<int>(source.size()) - 1;
-    for (int level = coarsest; level >= 0; --level) {
-        progress.begin_level();
-        const bool has_coarser = level < coarsest;
-        coordinates = synthesise_level(
-            {source[level], has_coarser ? &source[level + 1] : nullptr, target[level],
-             has_coarser ? &target[level + 1] : nullptr, coordinates, std::ldexp(options.kappa, -level)},
-            space, options.seed, [&](int rows) { progress.rows_done(rows); });
-        coordinates = refine_level({source[level], target[level], look, level, white}, coordinates, options,
-                                   [&] { progress.check(); });
-    }
-    return coordinates;
 }
 
 AlbedoMap read_albedo(const AlbedoMap& source, const cv::Mat2i& coordinates, const cv::Mat1b& valid) {
@@ -155,23 +116,62 @@ IndexMap read_index(const IndexMap& source, const cv::Mat2i& coordinates, const 
     return result;
 }
 
-TransferResult transferred(const TransferSource& source, const NormalMap& target, const TransferOptions& options,
-                           const WorkContext& work) {
-    const int levels = pyramid_levels(options.levels, source.normals.valid.size(), target.valid.size());
-    const MapPyramid sources = map_pyramid(source_level(source, options.normal_sigma), levels);
-    MapPyramid targets = map_pyramid(target_level(target, options.normal_sigma), levels);
-    const AlbedoMap exemplar{sources.front().albedo, sources.front().valid};
+/// Tells each finished pass of patchmatch, and stops the work when that is asked for.
+PassesDone tell_passes(const WorkContext& work) {
+    return [&work](int done, int all) {
+        if (work.cancelled()) throw Cancelled("texture transfer was cancelled", "start it again when you like");
+        work.tell({"transfer", static_cast<std::size_t>(done), static_cast<std::size_t>(all), {}});
+    };
+}
+
+/// The control map as a level of its own, so that it is halved like the others.
+MapPyramid control_pyramid(const cv::Mat3f& control, const MapLevel& level, int levels) {
+    if (control.empty()) return {};
+    MapLevel guide{level.normal, cv::Mat3f(level.normal.size(), cv::Vec3f(0, 0, 0)), level.valid};
+    control.copyTo(guide.albedo, level.valid);
+    return map_pyramid(guide, levels);
+}
+
+cv::Mat2i coordinates_by(const MapLevel& source, const MapLevel& target, const ControlMaps& control, float white,
+                         const TransferOptions& options, const WorkContext& work) {
+    const cv::Size sizes[] = {source.valid.size(), target.valid.size()};
+    switch (options.method) {
+        case TransferMethod::analogies: {
+            const int levels = pyramid_levels(options.levels, sizes[0], sizes[1]);
+            return analogies(map_pyramid(source, levels), map_pyramid(target, levels), white, options, work);
+        }
+        case TransferMethod::patchmatch: {
+            const int levels = patchmatch_levels(options.levels, sizes[0], sizes[1]);
+            const GuidedPyramid sources{map_pyramid(source, levels), control_pyramid(control.source, source, levels)};
+            const GuidedPyramid targets{map_pyramid(target, levels), control_pyramid(control.target, target, levels)};
+            const TexelCode code{white, options.normal_weight, options.control_weight, !control.source.empty()};
+            return patchmatch(sources, targets, code, options, tell_passes(work));
+        }
+        case TransferMethod::preview:
+            return preview(source, target, options);
+    }
+    return {};
+}
+
+TransferResult transferred(const TransferSource& source, const NormalMap& target, const ControlMaps& control,
+                           const TransferOptions& options, const WorkContext& work) {
+    const auto start = std::chrono::steady_clock::now();
+    const MapLevel from = source_level(source, options.normal_sigma);
+    const MapLevel onto = target_level(target, options.normal_sigma);
+    const AlbedoMap exemplar{from.albedo, from.valid};
     const float white = white_level(exemplar);
-    const FeatureSpace space(options, white, mean_albedo(sources.front()));
 
     TransferResult result;
-    result.coordinates = synthesise(sources, targets, space, white, options, work);
+    result.coordinates = coordinates_by(from, onto, control, white, options, work);
     result.albedo = read_albedo(source.albedo, result.coordinates, target.valid);
     result.index = read_index(source.index, result.coordinates, target.valid);
-    result.coverage_deg =
-        coverage_deg({sources.front().normal, sources.front().valid}, {targets.front().normal, targets.front().valid});
+    result.normals = moved_relief(source.normals, from, result.coordinates, target);
+    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+
+    result.uncovered_deg = uncovered_deg(from, onto);
+    result.coverage_deg = coverage_deg({from.normal, from.valid}, {onto.normal, onto.valid});
     result.coherence = coherence(result.coordinates);
-    const Appearance shown = appearance_of({sources.front().normal, sources.front().valid}, exemplar, white);
+    const Appearance shown = appearance_of({from.normal, from.valid}, exemplar, white);
     const Appearance moved = appearance_of(target, result.albedo, white);
     constexpr int sparse = 16;  // so that it costs little next to the synthesis
     result.patch_energy = patch_energy(colour_patches(shown, options.window), colour_patches(moved, options.window),
@@ -184,13 +184,11 @@ TransferResult transferred(const TransferSource& source, const NormalMap& target
 }  // namespace
 
 TransferResult transfer_texture(const TransferSource& source, const NormalMap& target, const TransferOptions& options,
-                                const WorkContext& work) {
-    const auto start = std::chrono::steady_clock::now();
+                                const WorkContext& work, const ControlMaps& control) {
     options.validate();
     require_input(source, target);
-    TransferResult result = on_threads_of(work, [&] { return transferred(source, target, options, work); });
-    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    return result;
+    require_control(control, source, target, options);
+    return on_threads_of(work, [&] { return transferred(source, target, control, options, work); });
 }
 
 }  // namespace darkbox

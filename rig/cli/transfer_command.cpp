@@ -1,12 +1,17 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "acquisition/frame/error.h"
 #include "processing/formats/environment_file.h"
+#include "processing/formats/exr.h"
 #include "processing/formats/map_files.h"
+#include "processing/formats/map_picture.h"
 #include "processing/formats/picture.h"
 #include "processing/formats/png.h"
 #include "processing/maps/srgb.h"
@@ -30,9 +35,16 @@ struct Arguments {
     fs::path target;
     fs::path target_mask;
     fs::path out;
+    fs::path source_control;
+    fs::path target_control;
+    std::vector<fs::path> apply;
     TransferOptions options;
     RelightArguments relight;
 };
+
+const std::map<std::string, TransferMethod> methods{{"analogies", TransferMethod::analogies},
+                                                    {"patchmatch", TransferMethod::patchmatch},
+                                                    {"preview", TransferMethod::preview}};
 
 /// The source's maps, and its shading maps where it is a session: only then can the target be relit.
 struct Source {
@@ -64,6 +76,37 @@ NormalMap load_target(const Arguments& a) {
     return a.target_mask.empty() ? read_normal_map(a.target) : read_normal_map(a.target, read_mask(a.target_mask));
 }
 
+ControlMaps load_control(const Arguments& a) {
+    if (a.source_control.empty() != a.target_control.empty())
+        throw InputError("a control map has two sides", "give --control-source FILE and --control-target FILE");
+    if (a.source_control.empty()) return {};
+    return {read_picture(a.source_control).samples, read_picture(a.target_control).samples};
+}
+
+/// Maps that go with the source's pixels, each with the name it gets in --out.
+struct CarriedMap {
+    fs::path name;
+    MapPicture map;
+};
+
+std::vector<CarriedMap> load_carried(const Arguments& a, cv::Size source) {
+    std::vector<CarriedMap> carried;
+    for (const fs::path& file : a.apply) {
+        const fs::path name = "applied-" + file.filename().string();
+        for (const CarriedMap& other : carried)
+            if (other.name == name)
+                throw InputError(fmt::format("two maps to apply are called {}", file.filename().string()),
+                                 "rename one, or apply them one after the other");
+        carried.push_back({name, read_map_picture(file)});
+        const cv::Size size = carried.back().map.size();
+        if (size != source)
+            throw InputError(fmt::format("{} is {}x{}, but the source is {}x{}", file.string(), size.width, size.height,
+                                         source.width, source.height),
+                             "apply a map of the source's own pixels");
+    }
+    return carried;
+}
+
 /// relit-1.png, relit-2.png, ... one for each light, then one for each environment.
 std::vector<fs::path> write_relit_pictures(const Arguments& a, const RelightScene& scene, const WorkContext& work) {
     const RelightOptions options = relight_options(a.relight);
@@ -93,15 +136,22 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
         throw InputError("plain maps cannot be relit: they have no shading maps",
                          "use a processed session as --source");
     const NormalMap target = load_target(a);
-    const TransferResult moved = transfer_texture(source.maps, target, a.options, work);
+    const ControlMaps control = load_control(a);
+    const std::vector<CarriedMap> carried = load_carried(a, source.maps.normals.valid.size());
+    const TransferResult moved = transfer_texture(source.maps, target, a.options, work, control);
 
     write_png(a.out / "albedo.png",
               viewable(moved.albedo.albedo, viewing_gain(source.maps.albedo.albedo, source.maps.albedo.valid)));
     write_albedo_map(a.out / "albedo.exr", moved.albedo);
     write_coordinates(a.out / "coordinates.png", moved.coordinates);
     if (moved.index.texels > 0) write_index_map(a.out / "index.png", moved.index);
+    write_normal_map(a.out / "normals.exr", moved.normals);
+    write_normal_map(a.out / "normals.png", moved.normals);
+    write_exr(a.out / "uncovered.exr", moved.uncovered_deg);
+    for (const CarriedMap& map : carried) write_map_picture(a.out / map.name, map.map.read_through(moved.coordinates));
     std::vector<fs::path> relit;
-    if (relit_wanted) relit = write_relit_pictures(a, {target, moved.albedo, moved.index, *source.shading}, work);
+    if (relit_wanted)
+        relit = write_relit_pictures(a, {moved.normals, moved.albedo, moved.index, *source.shading}, work);
 
     CommandResult result;
     result.json = {{"out", a.out.string()},
@@ -110,13 +160,15 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
                    {"coherence", moved.coherence},
                    {"histogram_distance", moved.histogram_distance},
                    {"coverage_deg", moved.coverage_deg},
-                   {"relit", Json::array()}};
+                   {"relit", Json::array()},
+                   {"applied", Json::array()}};
+    for (const CarriedMap& map : carried) result.json["applied"].push_back((a.out / map.name).string());
     for (const fs::path& path : relit) result.json["relit"].push_back(path.string());
     constexpr double covered_deg = 15;
     if (moved.coverage_deg > covered_deg)
         result.warnings.push_back(
             fmt::format("the source does not show all of the target's normals: 5 % of them are more than {:.0f} "
-                        "degrees from any of the source's",
+                        "degrees from any of the source's; uncovered.exr shows where",
                         moved.coverage_deg));
     result.text =
         fmt::format("{}: {} x {} pixels in {:.1f} s, coherence {:.2f}, patch energy {:.1f}", a.out.string(),
@@ -129,7 +181,7 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
 void add_transfer_command(CommandLine& line) {
     const auto a = std::make_shared<Arguments>();
     CLI::App& command =
-        line.add("transfer", "Move an object's texture onto another object (Image Analogies)",
+        line.add("transfer", "Move an object's texture onto another object",
                  "darkbox transfer --source s --target other --out moved --light=-0.5,0.5,0.7 --environment sky.hdr",
                  [a](const WorkContext& work) { return run(*a, work); });
     command.add_option("--source", a->source, "Processed session whose texture is taken");
@@ -138,11 +190,22 @@ void add_transfer_command(CommandLine& line) {
     command.add_option("--source-mask", a->source_mask, "  and a picture that is white on the object");
     command.add_option("--target", a->target, "Processed session, or a normal map as PNG or EXR")->required();
     command.add_option("--target-mask", a->target_mask, "White on the target, for a plain normal map");
-    command.add_option("--out", a->out, "Folder for albedo.png, index.png, coordinates.png, relit-*.png")->required();
-    command.add_option("--window", a->options.window, "Side of the window, pixels, odd")->capture_default_str();
-    command.add_option("--coarse-window", a->options.coarse_window, "Side of the window one level up, odd")
+    command.add_option("--out", a->out, "Folder for albedo, index, coordinates, normals and relit-*.png")->required();
+    command.add_option("--method", a->options.method, "analogies, patchmatch or preview (default: patchmatch)")
+        ->transform(CLI::CheckedTransformer(methods));
+    command.add_option("--apply", a->apply, "Other maps of the source, carried over in their own format")
+        ->expected(1, -1);
+    command.add_option("--control-source", a->source_control, "patchmatch: a drawn guide, 8- or 16-bit PNG or EXR");
+    command.add_option("--control-target", a->target_control, "  and where on the target its colours are wanted");
+    command.add_option("--control-weight", a->options.control_weight, "  and its weight against albedo")
         ->capture_default_str();
-    command.add_option("--kappa", a->options.kappa, "Hertzmann's coherence weight")->capture_default_str();
+    command.add_option("--jitter", a->options.jitter, "patchmatch, preview: 0...1, how freely chunks are picked")
+        ->capture_default_str();
+    command.add_option("--window", a->options.window, "Side of the window, pixels, odd")->capture_default_str();
+    command.add_option("--coarse-window", a->options.coarse_window, "analogies: side of the window one level up, odd")
+        ->capture_default_str();
+    command.add_option("--kappa", a->options.kappa, "Coherence weight: what continues a neighbour's patch wins")
+        ->capture_default_str();
     command.add_option("--normal-weight", a->options.normal_weight, "Weight of normals against albedo")
         ->capture_default_str();
     command.add_option("--sigma", a->options.normal_sigma, "Low-pass of the normals, pixels")->capture_default_str();

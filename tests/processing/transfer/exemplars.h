@@ -68,6 +68,12 @@ inline bool equal(const cv::Mat& a, const cv::Mat& b) {
     return true;
 }
 
+inline TransferOptions by(TransferMethod method) {
+    TransferOptions options;
+    options.method = method;
+    return options;
+}
+
 inline TransferResult transferred_on(int threads, const TransferSource& source, const NormalMap& target,
                                      const TransferOptions& options = {}) {
     WorkContext work;

@@ -14,6 +14,7 @@ using test::wavy_normals;
 
 TransferOptions with_passes(int passes) {
     TransferOptions options;
+    options.method = TransferMethod::analogies;
     options.passes = passes;
     return options;
 }

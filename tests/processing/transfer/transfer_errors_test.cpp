@@ -43,6 +43,8 @@ TEST(TransferOptions, NameTheFieldAndItsRange) {
     EXPECT_THAT(refused(&TransferOptions::kappa, 26.0), HasSubstr("kappa is 26"));
     EXPECT_THAT(refused(&TransferOptions::kappa, std::numeric_limits<double>::quiet_NaN()), HasSubstr("kappa is nan"));
     EXPECT_THAT(refused(&TransferOptions::normal_weight, -0.5), HasSubstr("normal_weight is -0.5"));
+    EXPECT_THAT(refused(&TransferOptions::jitter, 1.5), HasSubstr("jitter is 1.5, but it must be 0...1"));
+    EXPECT_THAT(refused(&TransferOptions::control_weight, -1.0), HasSubstr("control_weight is -1"));
     EXPECT_THAT(refused(&TransferOptions::normal_sigma, 65.0), HasSubstr("normal_sigma is 65"));
     EXPECT_EQ(refused(&TransferOptions::window, 15), "accepted");
 }
@@ -101,7 +103,8 @@ TEST(TransferErrors, CancellingStopsTheWork) {
         rows = update.done;
         if (rows >= 5) stop.request_stop();
     };
-    EXPECT_THROW(transfer_texture(stony_sphere(64), plane_normals({64, 64}), {}, work), Cancelled);
+    EXPECT_THROW(transfer_texture(stony_sphere(64), plane_normals({64, 64}), test::by(TransferMethod::analogies), work),
+                 Cancelled);
     EXPECT_LT(rows, 10U);
 }
 

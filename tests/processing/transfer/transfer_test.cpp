@@ -11,6 +11,7 @@
 namespace darkbox {
 namespace {
 
+using test::by;
 using test::equal;
 using test::plane_normals;
 using test::sphere_normals;
@@ -35,7 +36,7 @@ double mean_guide_error_deg(const NormalMap& source, const NormalMap& target, co
 
 TEST(Transfer, OntoItselfGivesItself) {
     const TransferSource source = stony_sphere(64);
-    TransferOptions options;
+    TransferOptions options = by(TransferMethod::analogies);
     options.levels = 1;
     options.normal_sigma = 0;
     options.normal_weight = 100;
@@ -50,7 +51,7 @@ TEST(Transfer, OntoItselfGivesItself) {
 
 TEST(Transfer, FollowsTheNormalsWithTheDefaults) {
     const TransferSource source = stony_sphere(96);
-    const TransferResult result = transfer_texture(source, source.normals);
+    const TransferResult result = transfer_texture(source, source.normals, by(TransferMethod::analogies));
     EXPECT_LT(mean_guide_error_deg(source.normals, source.normals, result.coordinates), 6);
     EXPECT_LT(result.coverage_deg, 0.01);
 }
@@ -58,7 +59,7 @@ TEST(Transfer, FollowsTheNormalsWithTheDefaults) {
 TEST(Transfer, NormalWeightBringsTheNormalsCloser) {
     const TransferSource source = stony_sphere(64);
     const NormalMap waves = wavy_normals({64, 64});
-    TransferOptions options;
+    TransferOptions options = by(TransferMethod::analogies);
     double before = 90;
     for (const double weight : {0.0, 1.0, 10.0}) {
         options.normal_weight = weight;
@@ -81,7 +82,7 @@ TEST(Transfer, UsesValidSourcePixelsOnly) {
         }
     NormalMap target = wavy_normals({70, 50});
     target.valid.colRange(10, 14) = std::uint8_t{0};
-    const TransferResult result = transfer_texture(source, target);
+    const TransferResult result = transfer_texture(source, target, by(TransferMethod::analogies));
     for (int y = 0; y < 50; ++y)
         for (int x = 0; x < 70; ++x) {
             const cv::Vec2i at = result.coordinates(y, x);
@@ -102,9 +103,9 @@ TEST(Transfer, UsesValidSourcePixelsOnly) {
 TEST(Transfer, IsTheSameOnAnyNumberOfThreads) {
     const TransferSource source = stony_sphere(64);
     const NormalMap target = wavy_normals({75, 66});
-    const TransferResult one = transferred_on(1, source, target);
+    const TransferResult one = transferred_on(1, source, target, by(TransferMethod::analogies));
     for (const int threads : {2, 8}) {
-        const TransferResult many = transferred_on(threads, source, target);
+        const TransferResult many = transferred_on(threads, source, target, by(TransferMethod::analogies));
         EXPECT_TRUE(equal(one.coordinates, many.coordinates)) << threads;
         EXPECT_EQ(one.patch_energy, many.patch_energy);
         EXPECT_EQ(one.coverage_deg, many.coverage_deg);
@@ -114,7 +115,7 @@ TEST(Transfer, IsTheSameOnAnyNumberOfThreads) {
 TEST(Transfer, KappaBringsCoherence) {
     const TransferSource source = stony_sphere(64);
     const NormalMap target = wavy_normals({64, 64});
-    TransferOptions options;
+    TransferOptions options = by(TransferMethod::analogies);
     options.passes = 0;
     double before = 0;
     for (const double kappa : {0.0, 2.0, 25.0}) {
@@ -128,9 +129,9 @@ TEST(Transfer, KappaBringsCoherence) {
 TEST(Transfer, DoesNotDependOnExposure) {
     TransferSource source = stony_sphere(48);
     const NormalMap target = wavy_normals({40, 40});
-    const TransferResult bright = transfer_texture(source, target);
+    const TransferResult bright = transfer_texture(source, target, by(TransferMethod::analogies));
     source.albedo.albedo *= 0.25;
-    const TransferResult dark = transfer_texture(source, target);
+    const TransferResult dark = transfer_texture(source, target, by(TransferMethod::analogies));
     EXPECT_TRUE(equal(bright.coordinates, dark.coordinates));
     EXPECT_NEAR(bright.patch_energy, dark.patch_energy, 1e-4);
 }
@@ -139,7 +140,7 @@ TEST(Transfer, OneColourGivesThatColour) {
     TransferSource source = stony_sphere(48);
     source.albedo.albedo.setTo(cv::Scalar(0.3, 0.2, 0.1), source.albedo.valid);
     source.index = {};
-    const TransferResult result = transfer_texture(source, wavy_normals({40, 30}));
+    const TransferResult result = transfer_texture(source, wavy_normals({40, 30}), by(TransferMethod::analogies));
     for (const cv::Vec3f& v : result.albedo.albedo) EXPECT_EQ(v, cv::Vec3f(0.3F, 0.2F, 0.1F));
     EXPECT_TRUE(result.index.label.empty());
     EXPECT_EQ(result.index.texels, 0);
@@ -152,7 +153,7 @@ TEST(Transfer, StripesStayStripes) {
         for (int x = 0; x < 64; ++x)
             source.albedo.albedo(y, x) =
                 x % period < period / 2 ? cv::Vec3f(0.8F, 0.7F, 0.6F) : cv::Vec3f(0.1F, 0.1F, 0.2F);
-    TransferOptions options;
+    TransferOptions options = by(TransferMethod::analogies);
     options.window = 9;  // must see a whole stripe to the left to know where it ends
     const TransferResult result = transfer_texture(source, plane_normals({72, 60}), options);
     int unlike_above = 0;
@@ -172,14 +173,14 @@ TEST(Transfer, WorksWithOneSourcePixel) {
     TransferSource source = stony_sphere(16);
     source.normals.valid = std::uint8_t{0};
     source.normals.valid(8, 7) = 255;
-    const TransferResult result = transfer_texture(source, wavy_normals({20, 12}));
+    const TransferResult result = transfer_texture(source, wavy_normals({20, 12}), by(TransferMethod::analogies));
     for (const cv::Vec2i& at : result.coordinates) EXPECT_EQ(at, cv::Vec2i(7, 8));
     EXPECT_GT(result.coverage_deg, 10);
 }
 
 TEST(Transfer, WorksForTargetsOfAnyShape) {
     const TransferSource source = stony_sphere(48);
-    TransferOptions options;
+    TransferOptions options = by(TransferMethod::analogies);
     options.levels = 4;
     options.window = 15;
     options.coarse_window = 5;
@@ -194,7 +195,7 @@ TEST(Transfer, TellsItsProgressRowByRow) {
     std::vector<ProgressUpdate> updates;
     WorkContext work;
     work.report = [&](const ProgressUpdate& update) { updates.push_back(update); };
-    transfer_texture(stony_sphere(64), wavy_normals({64, 64}), {}, work);
+    transfer_texture(stony_sphere(64), wavy_normals({64, 64}), by(TransferMethod::analogies), work);
     ASSERT_FALSE(updates.empty());
     EXPECT_EQ(updates.back().stage, "transfer");
     EXPECT_EQ(updates.back().done, 64U + 32U);

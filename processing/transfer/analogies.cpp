@@ -1,0 +1,71 @@
+#include "processing/transfer/analogies.h"
+
+#include <cmath>
+#include <utility>
+
+#include "acquisition/frame/error.h"
+#include "processing/transfer/appearance.h"
+#include "processing/transfer/expected_look.h"
+#include "processing/transfer/features.h"
+#include "processing/transfer/refinement.h"
+#include "processing/transfer/synthesis.h"
+
+namespace darkbox {
+namespace {
+
+cv::Vec3f mean_albedo(const MapLevel& level) {
+    const cv::Scalar mean = cv::mean(level.albedo, level.valid);
+    return {static_cast<float>(mean[0]), static_cast<float>(mean[1]), static_cast<float>(mean[2])};
+}
+
+/// Tells each finished row of each level once, and stops the work when that is asked for.
+class Progress {
+public:
+    Progress(const WorkContext& work, const MapPyramid& target) : work_(work) {
+        for (const MapLevel& level : target) total_ += level.valid.rows;
+    }
+
+    void begin_level() { before_ += std::exchange(rows_, 0); }
+
+    void check() const {
+        if (work_.cancelled()) throw Cancelled("texture transfer was cancelled", "start it again when you like");
+    }
+
+    void rows_done(int rows) {
+        check();
+        if (rows == rows_) return;
+        rows_ = rows;
+        work_.tell({"transfer", static_cast<std::size_t>(before_ + rows_), static_cast<std::size_t>(total_), {}});
+    }
+
+private:
+    const WorkContext& work_;
+    int total_ = 0;
+    int before_ = 0;
+    int rows_ = 0;
+};
+
+}  // namespace
+
+cv::Mat2i analogies(const MapPyramid& source, MapPyramid target, float white, const TransferOptions& options,
+                    const WorkContext& work) {
+    const FeatureSpace space(options, white, mean_albedo(source.front()));
+    const MapLevel& finest = source.front();
+    const ExpectedLook look(appearance_of({finest.normal, finest.valid}, {finest.albedo, finest.valid}, white));
+    Progress progress(work, target);
+    cv::Mat2i coordinates;
+    const int coarsest = static_cast<int>(source.size()) - 1;
+    for (int level = coarsest; level >= 0; --level) {
+        progress.begin_level();
+        const bool has_coarser = level < coarsest;
+        coordinates = synthesise_level(
+            {source[level], has_coarser ? &source[level + 1] : nullptr, target[level],
+             has_coarser ? &target[level + 1] : nullptr, coordinates, std::ldexp(options.kappa, -level)},
+            space, options.seed, [&](int rows) { progress.rows_done(rows); });
+        coordinates = refine_level({source[level], target[level], look, level, white}, coordinates, options,
+                                   [&] { progress.check(); });
+    }
+    return coordinates;
+}
+
+}  // namespace darkbox

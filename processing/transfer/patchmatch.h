@@ -1,0 +1,35 @@
+#pragma once
+
+#include <functional>
+#include <opencv2/core.hpp>
+
+#include "processing/transfer/pyramid.h"
+#include "processing/transfer/texel_bytes.h"
+#include "processing/transfer/transfer.h"
+
+namespace darkbox {
+
+/// A map's pyramid, and that of its control map (as albedo), empty where there is none.
+struct GuidedPyramid {
+    MapPyramid maps;
+    MapPyramid control;
+
+    const MapLevel* control_at(int level) const { return control.empty() ? nullptr : &control[level]; }
+};
+
+/// Called with the number of finished passes of all; may throw to stop the work.
+using PassesDone = std::function<void(int done, int all)>;
+
+/// How many levels patchmatch works on: seeds at a quarter of the resolution are large enough to keep stones whole, and
+/// small enough to follow the normals.
+int patchmatch_levels(int asked, cv::Size source, cv::Size target);
+
+/// Source coordinates of every valid target pixel, (-1, -1) elsewhere: chunks of the source are laid out at the
+/// coarsest level (seed.h), then refined coarse to fine by passes over all pixels (refine_row.h) under a balance of
+/// what is used (balance.h). A pass goes through the four classes of pixels that are even or odd in x and y; within a
+/// class all pixels look at the state before it, so they may be refined in any order: the result does not depend on the
+/// number of TBB's threads.
+cv::Mat2i patchmatch(const GuidedPyramid& source, const GuidedPyramid& target, const TexelCode& code,
+                     const TransferOptions& options, const PassesDone& passes_done);
+
+}  // namespace darkbox
