@@ -33,7 +33,7 @@ struct CalibrateOptions {
     CalibrationOptions calibration;
     std::optional<std::filesystem::path> ball_mask;  ///< a picture that is white on the ball or balls
     std::optional<std::filesystem::path> from;  ///< a lights.json, or a session that has one: its lights are reused
-    bool photometric = false;  ///< the object's own diffuse pixels help to refine the lights
+    bool photometric = false;                   ///< the object's own diffuse pixels help to refine the lights
     std::optional<GreyCard> grey_card;          ///< in view in the lit frames: tells intensities
     std::optional<std::filesystem::path> grey_card_mask;  ///< a picture that is white on it, instead of its area
 };
