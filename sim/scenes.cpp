@@ -80,7 +80,10 @@ const std::map<std::string, std::function<TexturePtr(std::uint64_t)>>& texture_m
         {"moss", moss_texture},
         {"marble", marble_texture},
         {"speckle", speckle_texture},
-        {"brick", brick_texture}};
+        {"brick", brick_texture},
+        {"weave", weave_texture},
+        {"print", print_texture},
+        {"melon", melon_texture}};
     return makers;
 }
 

@@ -159,8 +159,6 @@ private:
         double inside = 0.0;  ///< 0 in the mortar, 1 on the brick
     };
 
-    static std::int64_t wrapped(std::int64_t i, int period) { return period > 0 ? (i % period + period) % period : i; }
-
     static Place place_of(const SurfacePoint& point) {
         const double row = std::floor(point.uv.v);
         const double shifted = point.uv.u + 0.5 * std::abs(std::fmod(row, 2.0));

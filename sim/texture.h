@@ -17,6 +17,9 @@ struct SurfacePoint {
     int period_v = 0;
 };
 
+/// Tile i of a surface that closes after `period` tiles, 0...period - 1; 0 = it never does.
+constexpr std::int64_t wrapped(std::int64_t i, int period) { return period > 0 ? (i % period + period) % period : i; }
+
 /// A procedural texture. Solid ones depend on the position alone and so have no seams. Thread-safe.
 class Texture {
 public:
@@ -41,6 +44,12 @@ TexturePtr marble_texture(std::uint64_t seed);
 TexturePtr speckle_texture(std::uint64_t seed);
 /// Bricks in running bond, one to a tile, with mortar lying deeper than the bricks. Materials: mortar, brick.
 TexturePtr brick_texture(std::uint64_t seed);
+/// Coarse cloth of red warp and pale weft threads, each rising and diving. Materials: warp, weft.
+TexturePtr weave_texture(std::uint64_t seed);
+/// Blue cloth, softly creased, with flowers printed on it. Materials: ground, petal, heart.
+TexturePtr print_texture(std::uint64_t seed);
+/// A melon: a raised net of pale cork over a rind from green to ochre. Materials: rind, net.
+TexturePtr melon_texture(std::uint64_t seed);
 
 /// The unit normal of the surface with the texture's relief (Blinn: Simulation of wrinkled surfaces, 1978).
 /// `normal`: unit normal of the smooth surface.

@@ -107,7 +107,8 @@ TEST(Scenes, EveryLampShowsItsHighlightAndNoShadowOfTheBallFallsOnTheObject) {
 }
 
 TEST(Scenes, BrightestDiffusePartsUseTheSensorWell) {
-    for (const std::string name : {"brick-torus", "stone-sphere", "teapot-moss", "teapot-marble", "teapot-speckle"}) {
+    for (const std::string name : {"brick-torus", "stone-sphere", "teapot-moss", "teapot-marble", "teapot-speckle",
+                                   "sphere-weave-cloth40", "sphere-print-cloth40", "sphere-melon"}) {
         const Scene scene = scene_of(name, 160, lamps_at({{0, 0.2, 1}}));
         const SceneTruth truth = render_truth(scene);
         const RgbImage image = render_radiance(scene, LampId{0});
@@ -123,7 +124,8 @@ TEST(Scenes, BrightestDiffusePartsUseTheSensorWell) {
 }
 
 TEST(Textures, AreStochasticAndRepeatableBySeed) {
-    for (const auto make : {stone_texture, moss_texture, marble_texture, speckle_texture, brick_texture}) {
+    for (const auto make : {stone_texture, moss_texture, marble_texture, speckle_texture, brick_texture, weave_texture,
+                            print_texture, melon_texture}) {
         const auto colours = [&](std::uint64_t seed) {
             const TexturePtr texture = make(seed);
             std::vector<double> green;
@@ -149,18 +151,82 @@ TEST(Textures, AreStochasticAndRepeatableBySeed) {
     }
 }
 
-TEST(Textures, BricksCloseWithoutASeam) {
-    const TexturePtr brick = brick_texture(1);
-    for (int i = 0; i < 200; ++i) {
-        SurfacePoint left;
-        left.period_u = 12;
-        left.period_v = 10;
-        left.uv = {1e-7, 0.05 * i};
-        SurfacePoint right = left;
-        right.uv.u = 12 - 1e-7;
-        EXPECT_NEAR(brick->albedo(left).r, brick->albedo(right).r, 1e-4);
-        EXPECT_NEAR(brick->height_mm(left), brick->height_mm(right), 1e-4);
+TEST(Textures, TilesCloseWithoutASeam) {
+    for (const auto make : {brick_texture, weave_texture, print_texture}) {
+        const TexturePtr texture = make(1);
+        for (int i = 0; i < 200; ++i) {
+            SurfacePoint left;
+            left.period_u = 12;
+            left.period_v = 10;
+            left.uv = {1e-7, 0.05 * i + 0.013};  // no two threads are equally high there
+            SurfacePoint right = left;
+            right.uv.u = 12 - 1e-7;
+            EXPECT_NEAR(texture->albedo(left).r, texture->albedo(right).r, 1e-4);
+            EXPECT_NEAR(texture->height_mm(left), texture->height_mm(right), 1e-4);
+        }
     }
+}
+
+/// Of each material, the share of a plane's points and their mean height above it.
+struct MaterialShare {
+    double share = 0.0;
+    double height_mm = 0.0;
+};
+
+std::vector<MaterialShare> materials_of(const Texture& texture) {
+    std::vector<MaterialShare> found;
+    constexpr int side = 200;
+    for (int i = 0; i < side * side; ++i) {
+        SurfacePoint point;
+        point.position = {0.5 * (i % side), 0.5 * (i / side), 0.0};
+        point.uv = {point.position.x / 15.2, point.position.y / 7.6};
+        const auto material = static_cast<std::size_t>(texture.material(point));
+        if (found.size() <= material) found.resize(material + 1);
+        found[material].share += 1;
+        found[material].height_mm += texture.height_mm(point);
+    }
+    for (MaterialShare& one : found) {
+        one.height_mm /= one.share;
+        one.share /= side * side;
+    }
+    return found;
+}
+
+TEST(Textures, ThreadsOfAWeaveShareTheGroundAndRiseByTurns) {
+    const TexturePtr weave = weave_texture(1);
+    const auto found = materials_of(*weave);
+    ASSERT_EQ(found.size(), 2U);
+    EXPECT_NEAR(found[0].share, 0.5, 0.01);
+    EXPECT_NEAR(found[0].height_mm, found[1].height_mm, 0.005);
+    const auto at = [](double u, double v) {
+        SurfacePoint point;
+        point.uv = {u, v};
+        return point;
+    };
+    // Cells are a quarter of a tile long and half of one high.
+    for (const double u : {0.125, 0.375, 5.125}) {
+        EXPECT_NE(weave->material(at(u, 0.25)), weave->material(at(u, 0.75)));
+        EXPECT_NE(weave->material(at(u, 0.25)), weave->material(at(u + 0.25, 0.25)));
+        EXPECT_DOUBLE_EQ(weave->height_mm(at(u, 0.25)), 0.45);
+        EXPECT_NEAR(weave->height_mm(at(u + 0.125, 0.5)), 0.0, 1e-9);  // the hole between four crossings
+    }
+}
+
+TEST(Textures, APrintHasGroundPetalsAndHearts) {
+    const auto found = materials_of(*print_texture(1));
+    ASSERT_EQ(found.size(), 3U);
+    EXPECT_GT(found[0].share, 0.5);
+    EXPECT_GT(found[1].share, 0.15);
+    EXPECT_GT(found[2].share, 0.01);
+    EXPECT_LT(found[2].share, found[1].share);
+}
+
+TEST(Textures, AMelonsNetStandsAboveItsRind) {
+    const auto found = materials_of(*melon_texture(1));
+    ASSERT_EQ(found.size(), 2U);
+    EXPECT_GT(found[1].share, 0.15);
+    EXPECT_LT(found[1].share, 0.5);
+    EXPECT_GT(found[1].height_mm, found[0].height_mm + 0.3);
 }
 
 TEST(Textures, ReliefTurnsTheNormalAgainstTheSlope) {
