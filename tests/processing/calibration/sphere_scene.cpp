@@ -54,7 +54,6 @@ SphereRenderer::Ray SphereRenderer::follow(double u, double v) const {
             Ray ray = meeting(point, onward);
             ray.mirrored = true;
             ray.from = point;
-            ray.along = onward;
             return ray;
         }
     return meeting(eye, along);
@@ -62,6 +61,7 @@ SphereRenderer::Ray SphereRenderer::follow(double u, double v) const {
 
 SphereRenderer::Ray SphereRenderer::meeting(const Vector3d& from, const Vector3d& along) const {
     Ray ray;
+    ray.along = along;
     const auto t = distance_to(scene_.object, from, along);
     if (t && *t > 0) {
         ray.meets = Ray::Meets::object;
@@ -98,14 +98,16 @@ double SphereRenderer::radiance(const Ray& ray, const Vector3d& lamp) const {
 }
 
 cv::Mat1f SphereRenderer::render(const Vector3d& lamp) const {
-    cv::Mat1f image(scene_.size);
-    std::size_t next = 0;
-    for (float& pixel : image) {
-        double sum = 0;
-        for (int i = 0; i < grid * grid; ++i) sum += radiance(rays_[next++], lamp);
-        pixel = static_cast<float>(sum / (grid * grid));
-    }
-    if (scene_.blur_px > 0) cv::GaussianBlur(image, image, {}, scene_.blur_px);
+    // The lens blurs before the pixels gather.
+    cv::Mat1f fine(scene_.size * grid);
+    auto ray = rays_.begin();
+    for (int v = 0; v < scene_.size.height; ++v)
+        for (int u = 0; u < scene_.size.width; ++u)
+            for (int i = 0; i < grid * grid; ++i)
+                fine(v * grid + i / grid, u * grid + i % grid) = static_cast<float>(radiance(*ray++, lamp));
+    if (scene_.blur_px > 0) cv::GaussianBlur(fine, fine, {}, grid * scene_.blur_px);
+    cv::Mat1f image;
+    cv::resize(fine, image, scene_.size, 0, 0, cv::INTER_AREA);
     return image;
 }
 
