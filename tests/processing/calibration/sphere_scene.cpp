@@ -12,7 +12,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr int grid = 4;  ///< sub-pixels per side
 constexpr double wall_z = -60;
 constexpr double far_off = 5000;
 constexpr int room_waves = 6;
@@ -34,7 +33,8 @@ SphereRenderer::SphereRenderer(SphereScene scene) : scene_(std::move(scene)) {
         const Vector3d along(random.next(), random.next(), random.next());
         room_.push_back({room_detail * along, 10 * random.next()});
     }
-    rays_.reserve(static_cast<std::size_t>(scene_.size.area()) * grid * grid);
+    const int grid = scene_.rays_per_pixel_side;
+    rays_.reserve(static_cast<std::size_t>(scene_.size.area() * grid * grid));
     for (int v = 0; v < scene_.size.height; ++v)
         for (int u = 0; u < scene_.size.width; ++u)
             for (int i = 0; i < grid * grid; ++i)
@@ -98,6 +98,7 @@ double SphereRenderer::radiance(const Ray& ray, const Vector3d& lamp) const {
 }
 
 cv::Mat1f SphereRenderer::render(const Vector3d& lamp) const {
+    const int grid = scene_.rays_per_pixel_side;
     // The lens blurs before the pixels gather.
     cv::Mat1f fine(scene_.size * grid);
     auto ray = rays_.begin();

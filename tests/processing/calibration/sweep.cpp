@@ -29,6 +29,7 @@ Capture arranged(const SweepSetting& setting, int index) {
     Capture capture;
     SphereScene& scene = capture.scene;
     scene.mm_per_pixel = ball_radius_mm / setting.radius_px;
+    scene.rays_per_pixel_side = std::max(4, static_cast<int>(240 / setting.radius_px));  // small lamps stay round
     scene.lamp_radiance = setting.lamp_radiance;
     scene.wall = setting.wall;
     scene.near = setting.lamps != Lamps::distant;
