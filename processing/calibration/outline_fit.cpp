@@ -18,7 +18,9 @@ constexpr double most_share = 1.5;
 constexpr std::size_t sectors = 8;
 constexpr std::size_t fewest_profiles = 40;
 constexpr int most_steps = 25;
-constexpr int parameters = 7;  ///< x, y, radius, ellipse (2), share, blur
+constexpr double unseen = 2;  ///< of errors, to the share that sectors show: the rest is alike all around. Simulated
+constexpr double next_term = 0.5;  ///< of what the last term of the polynomial moved the circle, moves it the next
+constexpr int parameters = 7;      ///< x, y, radius, ellipse (2), share, blur
 
 using Parameters = Eigen::Matrix<double, parameters, 1>;
 using Information = Eigen::Matrix<double, parameters, parameters>;
@@ -109,8 +111,7 @@ public:
         const Information inverse = information_.inverse();
         constexpr double lost = static_cast<double>(sectors) / (sectors - 5);  // ellipse and prior take next to none
         const Information sandwich = lost * inverse * (pulls * pulls.transpose()) * inverse;
-        const Information independent = inverse;  // no sector estimate may fall below the noise's own
-        return sandwich.topLeftCorner<3, 3>() + independent.topLeftCorner<3, 3>();
+        return unseen * sandwich.topLeftCorner<3, 3>() + inverse.topLeftCorner<3, 3>();
     }
 
     void keep_readings(OutlineFit& fit) const {
@@ -226,7 +227,7 @@ std::optional<OutlineFit> fit_outline(const ReadProfile& read, const std::vector
                                 fit.circle.radius - coarse.circle().radius);
     fit.covariance = fine.covariance();
     const double aside = moved.head<2>().squaredNorm() / 2;
-    fit.covariance.diagonal() += Eigen::Vector3d(aside, aside, moved[2] * moved[2]);
+    fit.covariance.diagonal() += next_term * next_term * Eigen::Vector3d(aside, aside, moved[2] * moved[2]);
     if (!fit.covariance.allFinite()) return std::nullopt;
     return fit;
 }
