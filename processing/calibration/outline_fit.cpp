@@ -84,7 +84,7 @@ public:
     /// False where it comes to no rest.
     bool solve() {
         for (int step = 0; step < most_steps; ++step) {
-            if (step % 3 == 0 && step < 10 && !read_around(Circle{at_[0], at_[1], at_[2]})) return false;
+            if (step % 2 == 0 && step < 6 && !read_around(Circle{at_[0], at_[1], at_[2]})) return false;
             if (!linearise()) return false;
             Parameters move = -information_.ldlt().solve(gradient_);
             if (!move.allFinite()) return false;
@@ -94,7 +94,7 @@ public:
             at_[5] = std::clamp(at_[5], 0.0, most_share);
             at_[6] = std::clamp(at_[6], least_blur_px, most_blur_px);
             if (std::hypot(at_[0] - start_.x, at_[1] - start_.y, at_[2] - start_.radius) > most_move_px) return false;
-            if (step >= 10 && largest < 1e-4) break;
+            if (step >= 5 && largest < 1e-4) break;
         }
         return linearise() && at_[6] > least_blur_px && at_[6] < most_blur_px && at_[5] < most_share;
     }
