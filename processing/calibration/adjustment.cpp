@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "processing/calibration/lambert_cost.h"
+#include "processing/calibration/reflect.h"
 #include "processing/calibration/residuals.h"
 
 namespace darkbox {
@@ -26,6 +27,7 @@ Adjustment::Adjustment(const RefineInput& input, const std::vector<Believed>& be
     for (const BallObservations& ball : input.balls)
         spheres_.push_back(
             {ball.sphere.centre_mm.x(), ball.sphere.centre_mm.y(), ball.sphere.centre_mm.z(), ball.sphere.radius_mm});
+    shifts_.resize(spheres_.size());
     for (std::size_t ball = 0; ball < spheres_.size(); ++ball) add_ball(ball, believed[ball], loss);
     add_lamps(believed);
     for (std::size_t ball = 0; ball < spheres_.size(); ++ball) add_highlights(ball, believed[ball], loss);
@@ -47,11 +49,34 @@ void Adjustment::add_ball(std::size_t i, const Believed& believed, Loss loss) {
         problem_.AddResidualBlock(new Outline(new OutlinePrior{Viewing(input_.view), ball.outline->x, ball.outline->y,
                                                                ball.outline->radius, ball.outline_sigma_px}),
                                   nullptr, sphere);
+    if (ball.shift_covariance) {
+        add_shifting_contour(i, believed, loss);
+        return;
+    }
     for (std::size_t k = 0; k < ball.contour.size(); ++k)
         if (believed.point[k])
             problem_.AddResidualBlock(
                 new Contour(new ContourResidual(input_.view, ball.contour[k], believed.contour_sigma_px)),
                 loss_function(loss), sphere);
+}
+
+void Adjustment::add_shifting_contour(std::size_t i, const Believed& believed, Loss loss) {
+    using Contour = ceres::AutoDiffCostFunction<ShiftedContourResidual, 1, 4, 3>;
+    using Shift = ceres::AutoDiffCostFunction<VectorPrior, 3, 3>;
+    const BallObservations& ball = input_.balls[i];
+    const Eigen::Matrix3d root = ball.shift_covariance->llt().matrixL();
+    const Ball outline = outline_of(input_.view, ball.sphere);
+    double* const shift = shifts_[i].data();
+    for (std::size_t k = 0; k < ball.contour.size(); ++k) {
+        if (!believed.point[k]) continue;
+        const Eigen::Vector2d out(ball.contour[k].x - outline.x, ball.contour[k].y - outline.y);
+        const Eigen::Vector3d by_shift = root.transpose() * out.normalized().homogeneous();
+        const double sigma = ball.contour_sigma_px.empty() ? believed.contour_sigma_px : ball.contour_sigma_px[k];
+        problem_.AddResidualBlock(new Contour(new ShiftedContourResidual{
+                                      ContourResidual(input_.view, ball.contour[k], sigma), by_shift / sigma}),
+                                  loss_function(loss), spheres_[i].data(), shift);
+    }
+    problem_.AddResidualBlock(new Shift(new VectorPrior{{}, 1}), nullptr, shift);
 }
 
 void Adjustment::add_lamps(const std::vector<Believed>& believed) {

@@ -12,9 +12,9 @@ namespace darkbox {
 
 /// One ball's observations that are still believed.
 struct Believed {
-    std::vector<char> point;      ///< 1: the contour point counts
-    std::vector<char> highlight;  ///< 1: the frame's highlight counts
-    double contour_sigma_px = 0.3;
+    std::vector<char> point;        ///< 1: the contour point counts
+    std::vector<char> highlight;    ///< 1: the frame's highlight counts
+    double contour_sigma_px = 0.3;  ///< of a point that tells none of its own
 };
 
 enum class Loss { robust, squares };
@@ -48,6 +48,7 @@ private:
         ceres::ResidualBlockId residual;
     };
     void add_ball(std::size_t ball, const Believed& believed, Loss loss);
+    void add_shifting_contour(std::size_t ball, const Believed& believed, Loss loss);
     void add_lamps(const std::vector<Believed>& believed);
     void add_highlights(std::size_t ball, const Believed& believed, Loss loss);
     void add_nominal(const NominalLamps& nominal);
@@ -55,7 +56,8 @@ private:
 
     const RefineInput& input_;
     std::vector<std::array<double, 4>> spheres_;
-    std::vector<std::array<double, 3>> lamps_;  ///< one per frame
+    std::vector<std::array<double, 3>> shifts_;  ///< of each ball's whole contour, in standard deviations
+    std::vector<std::array<double, 3>> lamps_;   ///< one per frame
     std::vector<char> has_lamp_;
     std::vector<double> log_intensities_;  ///< one per frame, with the object's samples alone
     std::array<double, 3> turn_{}, shift_{};

@@ -1,6 +1,7 @@
 #include "processing/calibration/ball_contour.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
@@ -8,13 +9,14 @@
 
 #include "acquisition/frame/error.h"
 #include "processing/calibration/edge_profile.h"
+#include "processing/calibration/outline_fit.h"
 
 namespace darkbox {
 namespace {
 
 constexpr double step_px = 0.5;
 constexpr double blur_px = 0.8;           ///< applied to the picture before it is read
-constexpr double read_blur_px = 0.92;     ///< of rough profiles: that, the pixels', and the interpolation's
+constexpr double read_blur_px = 0.85;     ///< of rough profiles: that and the pixels'
 constexpr double margin_px = 2.0;         ///< of profile beyond the offsets that are tried
 constexpr double least_significance = 4;  ///< standard deviations of noise that an edge explains
 constexpr double floor_radiance = 1.0 / 1024;
@@ -26,20 +28,32 @@ struct Reading {
     double noise = 0;
 };
 
+/// Weights of four neighbours for a value a fraction after the second (Catmull and Rom 1974): interpolation that hardly
+/// blurs, and not by more halfway between pixels.
+std::array<double, 4> cubic_weights(double f) {
+    return {f * (-0.5 + f * (1 - 0.5 * f)), 1 + f * f * (-2.5 + 1.5 * f), f * (0.5 + f * (2 - 1.5 * f)),
+            f * f * (-0.5 + 0.5 * f)};
+}
+
 std::optional<double> sample(const cv::Mat1f& image, double x, double y) {
     const int left = static_cast<int>(std::floor(x)), top = static_cast<int>(std::floor(y));
-    if (left < 0 || top < 0 || left + 1 >= image.cols || top + 1 >= image.rows) return std::nullopt;
-    const double fx = x - left, fy = y - top;
-    const double above = (1 - fx) * image(top, left) + fx * image(top, left + 1);
-    const double below = (1 - fx) * image(top + 1, left) + fx * image(top + 1, left + 1);
-    return (1 - fy) * above + fy * below;
+    if (left < 1 || top < 1 || left + 2 >= image.cols || top + 2 >= image.rows) return std::nullopt;
+    const auto across = cubic_weights(x - left), down = cubic_weights(y - top);
+    double sum = 0;
+    for (int j = 0; j < 4; ++j) {
+        const float* row = image.ptr<float>(top - 1 + j) + left - 1;
+        double line = 0;
+        for (int i = 0; i < 4; ++i) line += across[static_cast<std::size_t>(i)] * row[i];
+        sum += down[static_cast<std::size_t>(j)] * line;
+    }
+    return sum;
 }
 
 /// Brightness along a radius, `half` steps to both sides of the circle; empty where it leaves the picture.
-Eigen::VectorXd profile(const cv::Mat1f& image, const Circle& circle, cv::Point2d out, int half) {
+Eigen::VectorXd profile(const cv::Mat1f& image, const Circle& circle, cv::Point2d out, int half, double step) {
     Eigen::VectorXd values(2 * half + 1);
     for (int i = -half; i <= half; ++i) {
-        const double radius = circle.radius + i * step_px;
+        const double radius = circle.radius + i * step;
         const auto value = sample(image, circle.x + radius * out.x, circle.y + radius * out.y);
         if (!value) return {};
         values[i + half] = *value;
@@ -66,7 +80,7 @@ std::vector<Reading> read_edges(const cv::Mat1f& image, const Circle& circle, do
     for (std::size_t i = 0; i < n; ++i) {
         const double angle = 2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(n);
         const cv::Point2d out(std::cos(angle), std::sin(angle));
-        Eigen::VectorXd values = profile(image, circle, out, profiles.half);
+        Eigen::VectorXd values = profile(image, circle, out, profiles.half, step_px);
         if (values.size() == 0) continue;
         profiles.values.push_back(std::move(values));
         outwards.push_back(out);
@@ -130,12 +144,37 @@ BallContour settled(const cv::Mat1f& image, const Circle& start, double first_re
     return contour;
 }
 
+/// Fits all radii of a settled outline together, where that settles.
+void fit_together(const cv::Mat1f& image, BallContour& contour) {
+    const Circle from = contour.circle;
+    std::vector<double> angles;
+    for (const cv::Point2d& p : contour.points) angles.push_back(std::atan2(p.y - from.y, p.x - from.x));
+    const ReadProfile read = [&](const Circle& circle, double angle, int half, double step) {
+        return profile(image, circle, {std::cos(angle), std::sin(angle)}, half, step);
+    };
+    const auto fit = fit_outline(read, angles, from, EdgeShape{read_blur_px, std::nullopt});
+    if (!fit) return;
+    contour.circle = fit->circle;
+    double squares = 0;
+    for (std::size_t i = 0; i < angles.size(); ++i) {
+        const double radius = fit->circle.radius + fit->offset_px[i];
+        contour.points[i] = {fit->circle.x + radius * std::cos(angles[i]),
+                             fit->circle.y + radius * std::sin(angles[i])};
+        squares += fit->offset_px[i] * fit->offset_px[i];
+    }
+    contour.spread_px = std::sqrt(squares / static_cast<double>(angles.size()));
+    contour.sigma_px = fit->sigma_px;
+    contour.shift_covariance = fit->covariance;
+}
+
 }  // namespace
 
 BallContour measure_contour(const cv::Mat1f& radiance, const Circle& start) {
     cv::Mat1f smooth;
     cv::GaussianBlur(radiance, smooth, {}, blur_px);
-    return settled(smooth, start, std::clamp(0.04 * start.radius, 2.0, 8.0));
+    BallContour contour = settled(smooth, start, std::clamp(0.04 * start.radius, 2.0, 8.0));
+    fit_together(smooth, contour);
+    return contour;
 }
 
 BallContour measure_mask(const cv::Mat1b& mask) {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "processing/calibration/circle_fit.h"
@@ -14,10 +16,14 @@ struct BallContour {
     double spread_px = 0;             ///< standard deviation of the points' distances
     double support = 0;               ///< share of the outline with a point
     std::size_t rejected = 0;         ///< readings off the circle
+    std::vector<double> sigma_px;     ///< of each point, across the outline; empty: all are alike
+    /// By which all points may be off together, as a circle (x, y, radius; px^2); none: as their scatter tells.
+    std::optional<Eigen::Matrix3d> shift_covariance;
 };
 
 /// The outline near `start`: along each radius, where the ball begins (see ProfileModel), to a fraction of a pixel. The
-/// search narrows while the circle settles. `radiance` is linear.
+/// search narrows while the circle settles; then all radii are fitted together (see OutlineFit), where one mirrored
+/// share explains them. `radiance` is linear.
 BallContour measure_contour(const cv::Mat1f& radiance, const Circle& start);
 
 /// The outline of a mask (255 on the ball, edges may be anti-aliased); the picture's border is not outline.

@@ -18,7 +18,6 @@ namespace darkbox {
 namespace {
 
 constexpr double hand_sigma_px = 0.5;          ///< a highlight read by hand
-constexpr double rim_bias_px = 0.05;           ///< of an outline's centre per axis, on a ball of one pixel's radius
 constexpr double ball_depth_sigma_mm = 10;     ///< balls stand about as far off as the object
 constexpr double ball_size_tolerance = 0.002;  ///< of a diameter that tells a perspective camera the depth
 constexpr double size_mismatch = 0.03;         ///< of the diameter: the scale or the diameter is wrong
@@ -155,12 +154,6 @@ Scale scale_of(const CalibrationOptions& options, const Ball& ball, cv::Size siz
     return scale;
 }
 
-/// How far an outline's centre is off because of what the ball mirrors beside its rim. The mirrored direction turns
-/// with the root of the depth below the rim over the radius, so that brightness rises there unlike a blurred step, on
-/// one side of the ball more than on the other; no circle shows it. Measured on rendered balls in unlike rooms
-/// (docs/decisions/0011).
-double outline_bias_px(double radius_px) { return rim_bias_px / std::sqrt(radius_px); }
-
 BallObservations observed(const LocatedBall& located, const Readings& highlights, const Scale& scale,
                           const CalibrationOptions& options) {
     BallObservations ball;
@@ -172,7 +165,8 @@ BallObservations observed(const LocatedBall& located, const Readings& highlights
     else if (scale.known)
         ball.depth_sigma_mm = ball_depth_sigma_mm;
     ball.contour = located.contour;
-    ball.outline_bias_px = outline_bias_px(located.ball.radius);
+    ball.contour_sigma_px = located.contour_sigma_px;
+    ball.shift_covariance = located.shift_covariance;
     if (located.sigma_px) {
         ball.outline = located.ball;
         ball.outline_sigma_px = *located.sigma_px;

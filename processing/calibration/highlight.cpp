@@ -18,7 +18,8 @@ constexpr double least_peak_of_median = 0.2;   ///< of the frames' median peak: 
 constexpr double least_share_of_other = 0.15;  ///< of the lamp's peak: a weaker spot is not another lamp
 constexpr double max_share_of_zone = 0.1;      ///< a lamp's image covers less of the mirror zone than this
 constexpr double max_small_area_px = 12;
-constexpr int fringe_px = 2;  ///< around a spot: half-covered and blurred pixels hold much of its position
+constexpr int fringe_px = 3;             ///< around a spot: half-covered and blurred pixels hold much of its position
+constexpr double windowed_share = 0.72;  ///< of a disc's lopsidedness that a centroid in a Gaussian window keeps
 constexpr int margin_px = 8;  ///< around the mirror zone, for the fringe and the background of spots at its border
 
 /// The part of the frames where lamps are mirrored: a rectangle about the zone, and which of its pixels are inside.
@@ -45,6 +46,7 @@ Zone mirror_zone_of(const Ball& ball, cv::Size size) {
 
 /// One frame's zone: luminance, the brightest channel, and luminance above what stands still.
 struct ZoneImage {
+    cv::Mat3f colour;
     cv::Mat1f luminance;
     cv::Mat1f strongest;
     cv::Mat1f moving;
@@ -78,7 +80,7 @@ cv::Mat1f standing_light(const std::vector<ZoneImage>& images) {
 std::vector<ZoneImage> zone_images(const std::vector<cv::Mat3f>& frames, const Zone& zone) {
     std::vector<ZoneImage> images;
     for (const cv::Mat3f& frame : frames)
-        images.push_back({mean_channel(frame(zone.box)), strongest_channel(frame(zone.box)), {}});
+        images.push_back({frame(zone.box), mean_channel(frame(zone.box)), strongest_channel(frame(zone.box)), {}});
     const cv::Mat1f standing = standing_light(images);
     for (ZoneImage& image : images) image.moving = image.luminance - standing;
     return images;
@@ -145,25 +147,49 @@ cv::Mat1b grown(const cv::Mat1b& member, int by_px) {
     return result;
 }
 
+/// Noise of each pixel's luminance: how far its colours are from the whole patch's mixture of them.
+std::vector<double> grain_of(const std::vector<cv::Vec3f>& colours) {
+    cv::Vec3d sum(0, 0, 0);
+    for (const cv::Vec3f& c : colours) sum += cv::Vec3d(c);
+    const double all = sum[0] + sum[1] + sum[2];
+    std::vector<double> grain;
+    for (const cv::Vec3f& c : colours) {
+        const double level = double(c[0]) + c[1] + c[2];
+        const cv::Vec3d off = cv::Vec3d(c) - level / (all > 0 ? all : 1) * sum;
+        grain.push_back(std::sqrt(off.dot(off) / 6));  // three colours less their sum; their mean has a third of it
+    }
+    return grain;
+}
+
+bool clipped(const ZoneImage& image, const cv::Mat1b& where) {
+    double strongest = 0;
+    cv::minMaxLoc(image.strongest, nullptr, &strongest, nullptr, nullptr, where);
+    return strongest >= full_scale && strongest < merged_scale;
+}
+
 /// The spot's pixels and its fringe, without other spots; coordinates of the frame.
 SpotPatch patch_of(const ZoneImage& image, const Spots& spots, const Spot& spot, const Zone& zone, const Ball& ball) {
     const cv::Mat1b own(spots.labels == spot.label), other((spots.labels > 0) & (spots.labels != spot.label));
     const cv::Mat1b near = grown(own, fringe_px), ring(grown(own, 2 * fringe_px) & ~near & ~other);
     SpotPatch patch;
+    const cv::Mat1b mine(near & ~other);
+    patch.clipped = clipped(image, mine);
+    // What stands still slopes beneath a spot and would draw its centroid; a saturated one is full scale in all.
+    const cv::Mat1f& seen = patch.clipped ? image.luminance : image.moving;
     std::vector<float> around;
-    float strongest = 0;
+    std::vector<cv::Vec3f> colours;
     for (int y = 0; y < own.rows; ++y)
         for (int x = 0; x < own.cols; ++x) {
-            if (ring(y, x)) around.push_back(image.luminance(y, x));
-            if (!near(y, x) || other(y, x)) continue;
+            if (ring(y, x)) around.push_back(seen(y, x));
+            if (!mine(y, x)) continue;
             patch.at.emplace_back(x + zone.box.x, y + zone.box.y);
-            patch.value.push_back(image.luminance(y, x));
-            strongest = std::max(strongest, image.strongest(y, x));
+            patch.value.push_back(seen(y, x));
+            colours.push_back(image.colour(y, x));
         }
-    patch.clipped = strongest >= full_scale && strongest < merged_scale;
     patch.top = *std::max_element(patch.value.begin(), patch.value.end());
     patch.background = std::min(median(around), 0.5 * patch.top);
-    patch.noise = noise_of(image.luminance, zone.inside);
+    patch.noise = noise_of(seen, zone.inside);
+    patch.grain = grain_of(colours);
     const cv::Point2d out = spot.middle + cv::Point2d(zone.box.tl()) - cv::Point2d(ball.x, ball.y);
     const double length = cv::norm(out);
     if (length > 0) patch.narrow = out / length;
@@ -178,7 +204,8 @@ cv::Point2d middle_of_lamp(const SpotMeasure& spot, const Ball& ball) {
     const cv::Point2d centre(ball.x, ball.y), out = spot.at - centre;
     const double ss = std::min(0.6, out.dot(out) / (ball.radius * ball.radius));
     const double a = std::min(0.3, 2 * spot.radius_px / ball.radius);
-    return centre + out * (1 + a * a / 8 * (4 - 3 * ss) / (4 * (1 - ss)));
+    const double share = spot.windowed ? windowed_share : 1;
+    return centre + out * (1 + share * a * a / 8 * (4 - 3 * ss) / (4 * (1 - ss)));
 }
 
 Highlight highlight_at(const SpotPatch& patch, const Ball& ball) {

@@ -49,6 +49,8 @@ LocatedBall located_by(const BallContour& contour) {
     located.ball = {contour.circle.x, contour.circle.y, contour.circle.radius, std::min(1.0, contour.support)};
     located.contour = contour.points;
     located.contour_spread_px = contour.spread_px;
+    located.contour_sigma_px = contour.sigma_px;
+    located.shift_covariance = contour.shift_covariance;
     located.rejected = contour.rejected;
     return located;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
@@ -12,9 +13,11 @@ namespace darkbox {
 struct LocatedBall {
     Ball ball;
     std::vector<cv::Point2d> contour;
-    std::size_t rejected = 0;        ///< readings off the outline
-    double contour_spread_px = 0;    ///< standard deviation of the contour's points
-    std::optional<double> sigma_px;  ///< of the circle itself, where the contour alone does not decide
+    std::size_t rejected = 0;                         ///< readings off the outline
+    double contour_spread_px = 0;                     ///< standard deviation of the contour's points
+    std::vector<double> contour_sigma_px;             ///< of each point; empty: all are alike
+    std::optional<Eigen::Matrix3d> shift_covariance;  ///< see BallContour
+    std::optional<double> sigma_px;                   ///< of the circle itself, where the contour alone does not decide
 };
 
 /// The balls given by hand, in the mask, or found, best first.

@@ -50,7 +50,8 @@ void judge_contour(const BallObservations& ball, const std::vector<double>& dist
     result.rejected_points = 0;
     result.worst_rejected_px = 0;
     for (std::size_t i = 0; i < distances.size(); ++i) {
-        believed.point[i] = std::abs(distances[i]) <= limit ? 1 : 0;
+        const double own = ball.contour_sigma_px.empty() ? 0 : rejected_sigmas * ball.contour_sigma_px[i];
+        believed.point[i] = std::abs(distances[i]) <= std::max(limit, own) ? 1 : 0;
         if (believed.point[i]) {
             points.push_back(ball.contour[i]);
             kept.push_back(distances[i]);
@@ -60,9 +61,7 @@ void judge_contour(const BallObservations& ball, const std::vector<double>& dist
         }
     }
     const ContourNoise noise = contour_noise(points, kept, {outline.x, outline.y});
-    // A centre fitted to n points all around is known to sigma times sqrt(2 / n).
-    const double per_point = std::sqrt(static_cast<double>(points.size()) / 2);
-    believed.contour_sigma_px = std::hypot(noise.effective_sigma_px(), ball.outline_bias_px * per_point);
+    believed.contour_sigma_px = noise.effective_sigma_px();
     result.contour_rms_px = noise.sigma_px;
     result.readings_per_independent = noise.readings_per_independent;
 }

@@ -18,7 +18,9 @@ struct BallObservations {
     double radius_sigma_mm = 1e4;  ///< and its radius
     std::optional<Ball> outline;   ///< believed beforehand, such as a circle drawn by hand
     double outline_sigma_px = 0.5;
-    double outline_bias_px = 0;  ///< standard deviation per axis by which the contour as a whole may be off
+    std::vector<double> contour_sigma_px;  ///< of each contour point; empty: as their scatter tells
+    /// By which the whole contour may be off, as a circle (x, y, radius; px^2); none: as the scatter tells.
+    std::optional<Eigen::Matrix3d> shift_covariance;
     std::vector<std::optional<Highlight>> highlights;  ///< one per frame
 };
 

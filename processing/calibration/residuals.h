@@ -35,6 +35,19 @@ struct ContourResidual {
     }
 };
 
+/// The same where the whole contour may be off: shifted and widened by three numbers in standard deviations.
+struct ShiftedContourResidual {
+    ContourResidual contour;
+    Eigen::Vector3d by_shift;  ///< how far out each of the three moves the point, in its standard deviations
+
+    template <class T>
+    bool operator()(const T* sphere, const T* shift, T* residual) const {
+        contour(sphere, residual);
+        for (int i = 0; i < 3; ++i) residual[0] -= by_shift[i] * shift[i];
+        return true;
+    }
+};
+
 /// A highlight's place, corrected for the lamp's size, against where the sphere mirrors the lamp's middle.
 struct HighlightResidual {
     Viewing viewing;

@@ -10,13 +10,14 @@ namespace darkbox {
 namespace {
 
 constexpr double floor_share = 0.1;        ///< of a spot's height: radiance that counts
-constexpr double upper_share = 0.45;       ///< its upper part, for comparison
-constexpr double steady_sigma_px = 0.007;  ///< what pixels and the threshold leave without noise: simulated
+constexpr double steady_sigma_px = 0.002;  ///< what is left without noise: simulated
 constexpr double blind_px = 0.29;          ///< standard deviation of a place known to one pixel
-constexpr double blur_px2 = 0.4;           ///< second moment that pixels and optics add to a spot
-constexpr double bloom_px = 0.7;           ///< by which a saturated spot outgrows the lamp's image
-constexpr double border_sigma = 0.15;      ///< px; of a saturated spot of radius 1, less for larger ones: simulated
-constexpr double part_sigma = 0.1;         ///< of the upper and lower parts' disagreement: simulated
+constexpr double blind_spread_px2 = 0.1;   ///< second moment by which a spot tells more of its place: simulated
+constexpr int most_rounds = 20;
+constexpr double blur_px2 = 0.4;          ///< second moment that pixels and optics add to a spot
+constexpr double bloom_px = 0.7;          ///< by which a saturated spot outgrows the lamp's image
+constexpr double border_sigma = 0.15;     ///< px; of a saturated spot of radius 1, less for larger ones: simulated
+constexpr double core_sigma = 0.3;        ///< of the whole spot's and its core's disagreement
 constexpr double round_residual = 0.12;   ///< squares per pixel of border, below which a saturated spot is a round lamp
 constexpr double odd_shape_sigma = 0.02;  ///< of the radius: a saturated spot of another shape hides its lamp's middle
 
@@ -42,24 +43,53 @@ Centroid centroid_above(const SpotPatch& patch, double share) {
     return c;
 }
 
-/// What noise of one unit does to the centroid in every pixel that counts, or that noise can make count.
-double noise_gain(const SpotPatch& patch, const Centroid& c) {
-    const double floor = patch.background + floor_share * (patch.top - patch.background);
-    double squares = 0;
-    for (std::size_t i = 0; i < patch.at.size(); ++i)
-        if (patch.value[i] > floor - 2 * patch.noise) squares += (patch.at[i] - c.at).dot(patch.at[i] - c.at) / 2;
-    return std::sqrt(squares) / c.sum;
+/// A centroid weighted by radiance and by a Gaussian window that moves with it, wider than the spot: no pixel enters or
+/// leaves at a threshold, so that the place does not hang on where the spot lies between pixels (as SExtractor's
+/// windowed positions, Bertin 2010).
+struct Windowed {
+    cv::Point2d at;
+    double sigma_px = 0;  ///< standard deviation per axis that noise gives
+    double spread = 0;    ///< second moment per axis of the whole spot, px^2, were it Gaussian
+};
+
+Windowed windowed_centroid(const SpotPatch& patch, const Centroid& start, double window2) {
+    const double overshoot = 1 + start.spread / window2;  // by which the window holds the place back, Gaussian spots
+    Windowed w{start.at, 0, start.spread};
+    for (int round = 0; round < most_rounds; ++round) {
+        double sum = 0, moment = 0, even = 0, grainy = 0;
+        cv::Point2d pull(0, 0);
+        for (std::size_t i = 0; i < patch.at.size(); ++i) {
+            const cv::Point2d d = patch.at[i] - w.at;
+            const double window = std::exp(-d.dot(d) / (2 * window2));
+            const double weight = window * (patch.value[i] - patch.background);
+            sum += weight;
+            pull += weight * d;
+            moment += weight * d.dot(d) / 2;
+            const double gain = window * window * d.dot(d) / 2;
+            even += gain * patch.noise * patch.noise;
+            grainy += gain * patch.grain[i] * patch.grain[i];
+        }
+        if (!(sum > 0)) return {start.at, blind_px, start.spread};
+        const cv::Point2d move = overshoot / sum * pull;
+        w.at += move;
+        if (moment > 0) w.spread = 1 / std::max(1 / (4 * window2), sum / moment - 1 / window2);
+        w.sigma_px = overshoot * std::sqrt(std::max(even, grainy)) / sum;
+        if (cv::norm(move) < 1e-5) break;
+    }
+    return w;
 }
 
 SpotMeasure by_centroid(const SpotPatch& patch) {
-    const Centroid whole = centroid_above(patch, floor_share), upper = centroid_above(patch, upper_share);
+    const Centroid start = centroid_above(patch, floor_share);
+    const Windowed windowed = windowed_centroid(patch, start, 2 * start.spread + 1);
+    const Windowed core = windowed_centroid(patch, start, start.spread + 0.5);
     SpotMeasure measure;
-    measure.at = whole.at;
-    measure.radius_px = 2 * std::sqrt(std::max(0.0, whole.spread - blur_px2));  // of a uniform disc
-    const double pixel = blind_px * std::exp(-whole.spread / 0.06);
-    const double disagreement = part_sigma * std::hypot(whole.at.x - upper.at.x, whole.at.y - upper.at.y);
-    measure.sigma_px =
-        std::hypot(patch.noise * noise_gain(patch, whole), std::hypot(pixel, steady_sigma_px, disagreement));
+    measure.at = windowed.at;
+    measure.windowed = true;
+    measure.radius_px = 2 * std::sqrt(std::max(0.0, windowed.spread - blur_px2));  // of a uniform disc
+    const double pixel = blind_px * std::exp(-windowed.spread / blind_spread_px2);
+    const double disagreement = core_sigma * cv::norm(windowed.at - core.at);
+    measure.sigma_px = std::hypot(windowed.sigma_px, std::hypot(pixel, steady_sigma_px, disagreement));
     return measure;
 }
 
@@ -123,7 +153,7 @@ SpotMeasure by_border(const SpotPatch& patch) {
     }
     const double radius = best->p[2];
     const cv::Point2d middle(best->p[0], best->p[1]);
-    SpotMeasure measure{middle, border_sigma / radius, std::max(0.0, radius - bloom_px)};
+    SpotMeasure measure{middle, border_sigma / radius, std::max(0.0, radius - bloom_px), false};
     if (best->residual > round_residual * 2 * std::numbers::pi * radius) {
         measure.at = start.at;
         measure.sigma_px = std::hypot(measure.sigma_px, cv::norm(middle - start.at) / 2, odd_shape_sigma * radius);

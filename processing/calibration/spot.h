@@ -14,22 +14,25 @@ struct SpotPatch {
     std::vector<double> value;    ///< radiance there; what saturates is at full scale
     double background = 0;        ///< radiance around the spot
     double top = 0;               ///< radiance at its brightest
-    double noise = 0;             ///< standard deviation of a value
-    bool clipped = false;         ///< `top` is the sensor's full scale
-    cv::Point2d narrow{1, 0};     ///< unit direction of the ellipse's short axis
-    double roundness = 1;         ///< short axis over long axis
+    double noise = 0;             ///< standard deviation of a value around the spot
+    /// Of each value, as its colours disagree: light itself is noisy, and a spot has more of it than its surroundings.
+    std::vector<double> grain;
+    bool clipped = false;      ///< `top` is the sensor's full scale
+    cv::Point2d narrow{1, 0};  ///< unit direction of the ellipse's short axis
+    double roundness = 1;      ///< short axis over long axis
 };
 
 struct SpotMeasure {
     cv::Point2d at;
-    double sigma_px = 0;   ///< standard deviation per axis
-    double radius_px = 0;  ///< of the circle of the same area
+    double sigma_px = 0;    ///< standard deviation per axis
+    double radius_px = 0;   ///< of the circle of the same area
+    bool windowed = false;  ///< `at` is a centroid in a Gaussian window, not of the whole spot
 };
 
-/// Where a spot is. One below full scale: its centroid weighted by radiance above a tenth of its height. A saturated
+/// Where a spot is. One below full scale: its centroid in a Gaussian window about twice as wide. A saturated
 /// one holds its place in its border alone, so an ellipse of the expected shape is fitted to that border; where flare
 /// has given it another shape, the centroid is the better guess, and less certain. The standard deviation holds noise,
-/// what pixels hide of a small spot's place, and how far the spot's upper and lower parts disagree about it.
+/// what pixels hide of a small spot's place, and how far the whole spot and its core disagree about it.
 SpotMeasure measure_spot(const SpotPatch& patch);
 
 }  // namespace darkbox

@@ -12,7 +12,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr int grid = 4;  ///< sub-pixels per side
 constexpr double wall_z = -60;
 constexpr double far_off = 5000;
 constexpr int room_waves = 6;
@@ -34,7 +33,8 @@ SphereRenderer::SphereRenderer(SphereScene scene) : scene_(std::move(scene)) {
         const Vector3d along(random.next(), random.next(), random.next());
         room_.push_back({room_detail * along, 10 * random.next()});
     }
-    rays_.reserve(static_cast<std::size_t>(scene_.size.area()) * grid * grid);
+    const int grid = scene_.rays_per_pixel_side;
+    rays_.reserve(static_cast<std::size_t>(scene_.size.area() * grid * grid));
     for (int v = 0; v < scene_.size.height; ++v)
         for (int u = 0; u < scene_.size.width; ++u)
             for (int i = 0; i < grid * grid; ++i)
@@ -54,7 +54,6 @@ SphereRenderer::Ray SphereRenderer::follow(double u, double v) const {
             Ray ray = meeting(point, onward);
             ray.mirrored = true;
             ray.from = point;
-            ray.along = onward;
             return ray;
         }
     return meeting(eye, along);
@@ -62,6 +61,7 @@ SphereRenderer::Ray SphereRenderer::follow(double u, double v) const {
 
 SphereRenderer::Ray SphereRenderer::meeting(const Vector3d& from, const Vector3d& along) const {
     Ray ray;
+    ray.along = along;
     const auto t = distance_to(scene_.object, from, along);
     if (t && *t > 0) {
         ray.meets = Ray::Meets::object;
@@ -98,14 +98,17 @@ double SphereRenderer::radiance(const Ray& ray, const Vector3d& lamp) const {
 }
 
 cv::Mat1f SphereRenderer::render(const Vector3d& lamp) const {
-    cv::Mat1f image(scene_.size);
-    std::size_t next = 0;
-    for (float& pixel : image) {
-        double sum = 0;
-        for (int i = 0; i < grid * grid; ++i) sum += radiance(rays_[next++], lamp);
-        pixel = static_cast<float>(sum / (grid * grid));
-    }
-    if (scene_.blur_px > 0) cv::GaussianBlur(image, image, {}, scene_.blur_px);
+    const int grid = scene_.rays_per_pixel_side;
+    // The lens blurs before the pixels gather.
+    cv::Mat1f fine(scene_.size * grid);
+    auto ray = rays_.begin();
+    for (int v = 0; v < scene_.size.height; ++v)
+        for (int u = 0; u < scene_.size.width; ++u)
+            for (int i = 0; i < grid * grid; ++i)
+                fine(v * grid + i / grid, u * grid + i % grid) = static_cast<float>(radiance(*ray++, lamp));
+    if (scene_.blur_px > 0) cv::GaussianBlur(fine, fine, {}, grid * scene_.blur_px);
+    cv::Mat1f image;
+    cv::resize(fine, image, scene_.size, 0, 0, cv::INTER_AREA);
     return image;
 }
 

@@ -22,8 +22,9 @@ struct SphereScene {
     double camera_distance = std::numeric_limits<double>::infinity();  ///< infinite: orthographic
     std::vector<Sphere> balls;
     Sphere object{{0, 0, 0}, 12};
-    bool near = false;          ///< lamps are points in mm; else directions
-    double blur_px = 0.6;       ///< of the lens: standard deviation
+    bool near = false;     ///< lamps are points in mm; else directions
+    double blur_px = 0.6;  ///< of the lens: standard deviation
+    int rays_per_pixel_side = 4;
     bool wall = true;           ///< stands behind the balls; without it they mirror the room all around
     std::uint64_t room = 1;     ///< which dim room the balls mirror
     double lamp_radius = 0.05;  ///< of the glowing disc: mm for near lamps, else radians

@@ -29,11 +29,12 @@ Capture arranged(const SweepSetting& setting, int index) {
     Capture capture;
     SphereScene& scene = capture.scene;
     scene.mm_per_pixel = ball_radius_mm / setting.radius_px;
+    scene.rays_per_pixel_side = std::max(4, static_cast<int>(240 / setting.radius_px));  // small lamps stay round
     scene.lamp_radiance = setting.lamp_radiance;
     scene.wall = setting.wall;
     scene.near = setting.lamps != Lamps::distant;
     scene.lamp_radius = scene.near ? 50 : 0.05;
-    scene.room = 31 * setting.noise.seed + static_cast<std::uint64_t>(index);
+    scene.room = 31 * setting.seed + static_cast<std::uint64_t>(index);
     if (setting.perspective) scene.camera_distance = camera_distance_mm;
     const double fraction = index * 0.6180339887 - std::floor(index * 0.6180339887);
     const double other = index * 0.7548776662 - std::floor(index * 0.7548776662);
@@ -94,6 +95,24 @@ CalibrationOptions options_of(const SweepSetting& setting, const Capture& captur
     return options;
 }
 
+/// Calibrates both ways and keeps how far the lights are off.
+void compare(const std::vector<cv::Mat3f>& frames, CalibrationOptions options, const Capture& capture,
+             SweepErrors& errors) {
+    const auto names = frame_names(frames.size());
+    const Calibration refined = calibrate(frames, names, options);
+    options.method = CalibrationMethod::brightest;
+    const Calibration raw = calibrate(frames, names, options);
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+        if (raw.lights[i].used) errors.raw_deg.push_back(angle_deg(raw.lights[i].direction, capture.directions[i]));
+        if (!refined.lights[i].used) {
+            ++errors.unread;
+            continue;
+        }
+        errors.refined_deg.push_back(angle_deg(refined.lights[i].direction, capture.directions[i]));
+        errors.chi_squared.push_back(chi_squared(refined.lights[i], capture.directions[i]));
+    }
+}
+
 double percent_point(double probability) { return -2 * std::log(1 - probability); }  // two degrees of freedom
 
 }  // namespace
@@ -112,35 +131,28 @@ double chi_squared(const Light& light, const Vector3d& truth) {
     return error.dot(covariance.inverse() * error);
 }
 
-SweepErrors sweep(const SweepSetting& setting) {
-    SweepErrors errors;
+std::vector<SweepErrors> sweep(const SweepSetting& setting) {
+    std::vector<SweepErrors> errors(setting.full_wells_e.size());
     for (int index = 0; index < setting.captures; ++index) {
         const Capture capture = arranged(setting, index);
-        NormalNumbers random(977 * setting.noise.seed + static_cast<std::uint64_t>(index));
+        NormalNumbers random(977 * setting.seed + static_cast<std::uint64_t>(index));
+        const CalibrationOptions options = options_of(setting, capture, random);
         const SphereRenderer renderer(capture.scene);
-        std::vector<cv::Mat3f> frames;
-        for (const Vector3d& lamp : capture.lamps) {
-            SensorNoise noise = setting.noise;
-            noise.seed = 7919 * setting.noise.seed + 131 * static_cast<std::uint64_t>(index) + frames.size();
-            frames.push_back(photographed(renderer.render(lamp), noise));
-        }
-        CalibrationOptions options = options_of(setting, capture, random);
-        const auto names = frame_names(frames.size());
-        const Calibration refined = calibrate(frames, names, options);
-        options.method = CalibrationMethod::brightest;
-        const Calibration raw = calibrate(frames, names, options);
-        for (std::size_t i = 0; i < frames.size(); ++i) {
-            if (raw.lights[i].used) errors.raw_deg.push_back(angle_deg(raw.lights[i].direction, capture.directions[i]));
-            if (!refined.lights[i].used) {
-                ++errors.unread;
-                continue;
+        std::vector<cv::Mat1f> clean;
+        for (const Vector3d& lamp : capture.lamps) clean.push_back(renderer.render(lamp));
+        for (std::size_t level = 0; level < errors.size(); ++level) {
+            std::vector<cv::Mat3f> frames;
+            for (const cv::Mat1f& image : clean) {
+                SensorNoise noise;
+                noise.full_well_e = setting.full_wells_e[level];
+                noise.seed = 7919 * setting.seed + 131 * static_cast<std::uint64_t>(index) + 17 * level + frames.size();
+                frames.push_back(photographed(image, noise));
             }
-            errors.refined_deg.push_back(angle_deg(refined.lights[i].direction, capture.directions[i]));
-            errors.chi_squared.push_back(chi_squared(refined.lights[i], capture.directions[i]));
+            compare(frames, options, capture, errors[level]);
         }
     }
-    for (auto* values : {&errors.raw_deg, &errors.refined_deg, &errors.chi_squared})
-        std::sort(values->begin(), values->end());
+    for (SweepErrors& e : errors)
+        for (auto* values : {&e.raw_deg, &e.refined_deg, &e.chi_squared}) std::sort(values->begin(), values->end());
     return errors;
 }
 

@@ -11,7 +11,8 @@ namespace darkbox::test {
 /// One setting of the simulated sweep over light calibration.
 struct SweepSetting {
     double radius_px = 60;
-    SensorNoise noise;
+    std::vector<double> full_wells_e{20000};  ///< noise levels: every capture is photographed with each
+    std::uint64_t seed = 1;
     int lights = 12;
     enum class Lamps { distant, near_two_balls, near_one_ball } lamps = Lamps::distant;
     bool perspective = false;
@@ -33,8 +34,8 @@ struct SweepErrors {
     double share_below(double probability) const;
 };
 
-/// Renders, photographs with noise, calibrates both ways, compares with the truth at the object.
-SweepErrors sweep(const SweepSetting& setting);
+/// Renders, photographs with noise, calibrates both ways, compares with the truth at the object. One per noise level.
+std::vector<SweepErrors> sweep(const SweepSetting& setting);
 /// Adds the errors of one setting to another's.
 void gather(SweepErrors& into, const SweepErrors& more);
 
