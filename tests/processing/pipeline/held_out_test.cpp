@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "processing/normals/semi_calibrated.h"
 #include "tests/processing/normals/lit_sphere.h"
 #include "tests/support/textured_sphere.h"
 #include "tests/support/throws.h"
@@ -97,6 +98,36 @@ TEST(HeldOut, NothingOfTheHeldOutPhotographIsLearnt) {
     EXPECT_EQ(std::memcmp(normals[0].data, normals[1].data, normals[0].total() * sizeof(cv::Vec3f)), 0);
 }
 
+TEST(HeldOut, EstimatedIntensitiesAreEstimatedAgainWithoutTheHeldOutPhotograph) {
+    test::TexturedSphere scene = fully_lit_sphere();
+    std::vector<Eigen::Vector3d> intensities;
+    const Predictor spy{"spy", [&](const HeldOutTraining& training, const Light& light, const WorkContext&) {
+                            for (const Light& other : training.lights)
+                                if (light.file == "ring-3.png" && other.used) intensities.push_back(other.intensity);
+                            return std::optional(training.stack.images.front());
+                        }};
+    const auto record = [&] {
+        scene.lights = estimate_intensities(scene.stack, scene.lights).lights;
+        leave_one_light_out(scene.stack, scene.lights, photometric_stereo(scene.stack, scene.lights), {spy}, {},
+                            HeldOutIntensities::estimated);
+    };
+    record();
+    const double whole = scene.lights[0].intensity[0];
+    scene.stack.images[3] += scene.stack.images[5];
+    record();
+    EXPECT_GT(std::abs(scene.lights[0].intensity[0] - whole), 1e-3);  // there was something to leak
+    ASSERT_EQ(intensities.size(), 14u);
+    for (std::size_t i = 0; i < 7; ++i) EXPECT_EQ(intensities[i], intensities[i + 7]) << i;
+}
+
+TEST(HeldOut, PredictsExactlyWithEstimatedIntensities) {
+    test::TexturedSphere scene = fully_lit_sphere();
+    scene.lights = estimate_intensities(scene.stack, scene.lights).lights;
+    const auto lights = leave_one_light_out(scene.stack, scene.lights, photometric_stereo(scene.stack, scene.lights),
+                                            {lambert_predictor()}, {}, HeldOutIntensities::estimated);
+    for (const HeldOutLight& light : lights) EXPECT_LT(light.errors.at(0)[all]->rmse_relative, 1e-4) << light.file;
+}
+
 TEST(HeldOut, PredictorsStandBesideEachOther) {
     const test::TexturedSphere scene = fully_lit_sphere();
     const Predictor black{"black", [](const HeldOutTraining& training, const Light&, const WorkContext&) {
@@ -168,8 +199,9 @@ TEST(HeldOut, IsTheSameOnAnyNumberOfThreads) {
     for (const int threads : {1, 3}) {
         WorkContext work;
         work.threads = threads;
-        const auto lights = leave_one_light_out(
-            scene.stack, scene.lights, photometric_stereo(scene.stack, scene.lights), {lambert_predictor()}, {}, work);
+        const auto lights =
+            leave_one_light_out(scene.stack, scene.lights, photometric_stereo(scene.stack, scene.lights),
+                                {lambert_predictor()}, {}, HeldOutIntensities::given, work);
         for (const HeldOutLight& light : lights) errors[threads / 3].push_back(light.errors[0][all]->rmse_relative);
     }
     EXPECT_EQ(errors[0], errors[1]);
