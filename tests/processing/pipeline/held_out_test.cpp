@@ -57,9 +57,10 @@ TEST(HeldOut, NearLightsFallOnTheSurface) {
     PhotometricStereoOptions options;
     options.geometry = {sphere.view(), sphere.height_mm()};
     const auto reference = photometric_stereo(sphere.stack, sphere.lights, options);
-    for (const HeldOutLight& light :
-         leave_one_light_out(sphere.stack, sphere.lights, reference, {lambert_predictor()}, options)) {
-        EXPECT_LT(light.errors.at(0)[all]->rmse_relative, 1e-4) << light.file;
+    for (const HeldOutLight& light : leave_one_light_out(
+             sphere.stack, sphere.lights, reference,
+             {lambert_predictor(), darkbox_predictor(Lookup::thesis), darkbox_predictor(Lookup::detail)}, options)) {
+        for (const PredictionErrors& errors : light.errors) EXPECT_LT(errors[all]->rmse_relative, 1e-4) << light.file;
         EXPECT_FALSE(light.errors[0][shadowed] || light.errors[0][highlight]);
     }
 }
@@ -195,16 +196,20 @@ TEST(HeldOut, ALightThatTheOthersCannotDoWithoutHasNoErrors) {
 
 TEST(HeldOut, IsTheSameOnAnyNumberOfThreads) {
     const test::TexturedSphere scene = test::textured_sphere(64, 8);
-    std::vector<double> errors[2];
-    for (const int threads : {1, 3}) {
+    const auto errors_on = [&scene](int threads) {
         WorkContext work;
         work.threads = threads;
-        const auto lights =
-            leave_one_light_out(scene.stack, scene.lights, photometric_stereo(scene.stack, scene.lights),
-                                {lambert_predictor()}, {}, HeldOutIntensities::given, work);
-        for (const HeldOutLight& light : lights) errors[threads / 3].push_back(light.errors[0][all]->rmse_relative);
-    }
-    EXPECT_EQ(errors[0], errors[1]);
+        std::vector<double> errors;
+        for (const HeldOutLight& light :
+             leave_one_light_out(scene.stack, scene.lights, photometric_stereo(scene.stack, scene.lights),
+                                 every_predictor(), {}, HeldOutIntensities::estimated, work))
+            for (const PredictionErrors& of : light.errors) errors.push_back(of[all]->rmse_relative);
+        return errors;
+    };
+    const std::vector<double> one = errors_on(1);
+    EXPECT_EQ(one.size(), 8u * 4u);
+    EXPECT_EQ(errors_on(2), one);
+    EXPECT_EQ(errors_on(8), one);
 }
 
 TEST(HeldOut, ThreeLightsAreTooFew) {
