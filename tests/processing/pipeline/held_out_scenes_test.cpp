@@ -38,7 +38,7 @@ TEST(HeldOutScenes, DetailPredictsAPhongSphereBetterThanLambertAndPtm) {
 }
 
 TEST(HeldOutScenes, DetailPredictsABrickTorusThatShadowsItselfBest) {
-    const test::SimulatedStack torus = test::simulated_stack("brick-torus", 12, 160);
+    const test::SimulatedStack torus = test::simulated_stack("brick-torus", 12, 112);
     const MeanErrors errors = mean_errors_of(torus.stack, torus.lights);
     EXPECT_LT(errors.detail, errors.thesis);
     EXPECT_LT(errors.detail, errors.lambert);
