@@ -234,10 +234,12 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
     return summary;
 }
 
-Lights load_lights(const Session& session) {
+Calibration load_calibration(const Session& session) {
     const ResultFiles files(session.folder());
     require_made(files.calibration, session, "calibrate");
-    return read_calibration(files.calibration).calibration.lights;
+    return read_calibration(files.calibration).calibration;
 }
+
+Lights load_lights(const Session& session) { return load_calibration(session).lights; }
 
 }  // namespace darkbox

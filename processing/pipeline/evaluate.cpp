@@ -80,13 +80,16 @@ class Bench {
 public:
     Bench(const Session& session, const EvaluateOptions& options, const WorkContext& work)
         : session_(session), options_(options), work_(work), files_(session.folder()) {
-        lights_ = lights_without(load_lights(session), options.drop);
+        Calibration calibration = load_calibration(session);
+        if (calibration.intensity_origin == IntensityOrigin::estimated) intensities_ = HeldOutIntensities::estimated;
+        lights_ = lights_without(std::move(calibration.lights), options.drop);
         solver_ = options.solver ? *options.solver : solver_of_results(files_);
         geometry_ = scene_geometry(files_);
     }
 
     const Lights& lights() const { return lights_; }
     Solver solver() const { return solver_; }
+    HeldOutIntensities intensities() const { return intensities_; }
 
     const PhotoStack& stack() {
         if (!stack_) stack_ = load_stack(session_, work_);
@@ -119,6 +122,7 @@ private:
     const WorkContext& work_;
     ResultFiles files_;
     Lights lights_;
+    HeldOutIntensities intensities_ = HeldOutIntensities::given;
     Solver solver_ = Solver::lsq;
     SceneGeometry geometry_;
     std::optional<PhotoStack> stack_;
@@ -171,11 +175,11 @@ void leave_lights_out(Bench& bench, const WorkContext& work, Evaluation& evaluat
     const std::vector<Predictor> predictors = every_predictor();
     for (const Predictor& predictor : predictors) evaluation.predictors.push_back(predictor.name);
     evaluation.held_out = leave_one_light_out(bench.stack(), bench.lights(), bench.solve(Solver::robust), predictors,
-                                              bench.solving_with(bench.solver()), work);
+                                              bench.solving_with(bench.solver()), bench.intensities(), work);
     for (const HeldOutLight& light : evaluation.held_out)
         if (light.errors.empty())
-            evaluation.warnings.push_back(
-                fmt::format("{} cannot be left out: the other lights lie in one plane", light.file));
+            evaluation.warnings.push_back(fmt::format(
+                "{} cannot be left out: the other lights do not tell normals and intensities alone", light.file));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "acquisition/frame/error.h"
+#include "processing/normals/semi_calibrated.h"
 #include "processing/pipeline/angular_error.h"
 #include "processing/pipeline/steps.h"
 #include "processing/shading/shading.h"
@@ -89,12 +90,38 @@ PredictionErrors compare(const cv::Mat3f& predicted, const cv::Mat3f& observed, 
     return errors;
 }
 
-bool solvable(const Lights& lights) {
+/// The lights with that one left out, and its own brought to the scale of the others.
+struct Fold {
+    Lights others;
+    Light held_out;
+};
+
+/// Both scales have a mean of 1 over their lights, which are not the same ones.
+Light on_scale_of(const Lights& others, Light light, const Lights& before) {
+    Eigen::Vector3d now = Eigen::Vector3d::Zero(), then = Eigen::Vector3d::Zero();
+    for (std::size_t i = 0; i < others.size(); ++i) {
+        if (!others[i].used) continue;
+        now += others[i].intensity;
+        then += before[i].intensity;
+    }
+    light.intensity.array() *= now.array() / then.array();
+    return light;
+}
+
+/// None where the other lights do not suffice.
+std::optional<Fold> fold_without(std::size_t left_out, const PhotoStack& stack, const Lights& lights,
+                                 HeldOutIntensities intensities, const WorkContext& work) {
     try {
-        require_solvable(lights);
-        return true;
+        Fold fold{lights, lights[left_out]};
+        fold.others[left_out].used = false;
+        require_solvable(fold.others);
+        if (intensities == HeldOutIntensities::estimated) {
+            fold.others = estimate_intensities(stack, fold.others, {}, work).lights;
+            fold.held_out = on_scale_of(fold.others, lights[left_out], lights);
+        }
+        return fold;
     } catch (const InputError&) {
-        return false;
+        return std::nullopt;
     }
 }
 
@@ -188,7 +215,8 @@ std::vector<bool> on_hull(const Lights& lights) {
 std::vector<HeldOutLight> leave_one_light_out(const PhotoStack& stack, const Lights& lights,
                                               const PhotometricStereoResult& reference,
                                               const std::vector<Predictor>& predictors,
-                                              const PhotometricStereoOptions& options, const WorkContext& work) {
+                                              const PhotometricStereoOptions& options, HeldOutIntensities intensities,
+                                              const WorkContext& work) {
     if (count_used(lights) < 4)
         throw InputError("with a light left out, fewer than three lights remain",
                          "leaving one out needs at least four lights");
@@ -202,16 +230,15 @@ std::vector<HeldOutLight> leave_one_light_out(const PhotoStack& stack, const Lig
         HeldOutLight& result = results.emplace_back();
         result.file = lights[i].file;
         result.hull = hull[i];
-        Lights others = lights;
-        others[i].used = false;
-        if (!solvable(others)) continue;
-        const PhotometricStereoResult solved = photometric_stereo(stack, others, options, quietly);
+        const auto fold = fold_without(i, stack, lights, intensities, quietly);
+        if (!fold) continue;
+        const PhotometricStereoResult solved = photometric_stereo(stack, fold->others, options, quietly);
         result.normal_change_deg = mean_change_deg(solved.normals, whole.normals);
         const cv::Mat1b kinds = kinds_of(stack, i, lights[i], reference, options.geometry);
-        const RelightScene scene = scene_of(stack, others, solved, options.geometry, quietly);
+        const RelightScene scene = scene_of(stack, fold->others, solved, options.geometry, quietly);
         for (const Predictor& predictor : predictors) {
             const auto predicted =
-                predictor.predict({stack, others, solved, scene, options.geometry}, lights[i], quietly);
+                predictor.predict({stack, fold->others, solved, scene, options.geometry}, fold->held_out, quietly);
             result.errors.push_back(predicted ? compare(*predicted, stack.images[i], stack.clipped[i], kinds)
                                               : PredictionErrors{});
         }

@@ -43,15 +43,24 @@ struct HeldOutLight {
     double normal_change_deg = 0;          ///< mean angle between the normals with and without this photograph
 };
 
+/// How the lamps' intensities are known.
+enum class HeldOutIntensities {
+    given,      ///< from elsewhere than these photographs
+    estimated,  ///< from these photographs: to be estimated again without the one that is left out
+};
+
 /// Pixels are compared where `reference`, a fit to all photographs, is valid; it also says which are lit, shadowed or
 /// highlights, so that the kinds are the same whatever is compared. A pixel that the refit cannot solve is predicted
-/// black. Where the photograph is clipped a brighter prediction is no error. Lights that are not used are passed over;
-/// a light without which the others have no unique solution gets no errors. Throws InputError as photometric_stereo()
-/// does, and for fewer than four used lights.
+/// black. The held-out light's own direction and intensity are given, as predicting its photograph needs them; of an
+/// estimated intensity, that is its ratio to the other lights'. Where the photograph is clipped a brighter prediction
+/// is no error. Lights that are not used are passed over; a light without which the others have no unique solution, or
+/// leave their intensities open, gets no errors. Throws InputError as photometric_stereo() does, and for fewer than
+/// four used lights.
 std::vector<HeldOutLight> leave_one_light_out(const PhotoStack& stack, const Lights& lights,
                                               const PhotometricStereoResult& reference,
                                               const std::vector<Predictor>& predictors,
                                               const PhotometricStereoOptions& options = {},
+                                              HeldOutIntensities intensities = HeldOutIntensities::given,
                                               const WorkContext& work = {});
 
 /// Lights whose photographs are predicted between others, beyond them, or both.

@@ -35,7 +35,8 @@ struct Predictor {
 
 /// "lambert": albedo times max(0, N.L) times the light's intensity, of a near light as it arrives at the pixel.
 Predictor lambert_predictor();
-/// "darkbox_thesis" or "darkbox_detail": the object relit from its shading maps.
+/// "darkbox_thesis" or "darkbox_detail": the object relit from its shading maps, by a near lamp as it arrives at the
+/// pixel.
 Predictor darkbox_predictor(Lookup lookup);
 /// "ptm": a polynomial texture map of the photographs, one polynomial per channel; it takes every light for distant.
 /// None below six lights, or where their terms are not independent.

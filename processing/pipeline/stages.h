@@ -132,7 +132,9 @@ ProcessSummary run_process(const Session& session, const ProcessOptions& options
 RelightScene load_scene(const Session& session);
 /// What relight needs: the same, but its albedo is that under the shading maps (ShadingResult::albedo).
 RelightScene load_shaded_scene(const Session& session);
-/// The lights of calibration/lights.json.
+/// What calibration/lights.json holds.
+Calibration load_calibration(const Session& session);
+/// Its lights.
 Lights load_lights(const Session& session);
 
 }  // namespace darkbox

@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <vector>
@@ -82,14 +83,14 @@ GainCurve measured_curve(const Views& views, const Pixels& pixels, int levels) {
 
 /// What a pixel's samples say of its albedo under its texel's curve: least squares, per channel.
 struct Evidence {
-    cv::Vec3d by_radiance{0, 0, 0}, squared{0, 0, 0}, radiance_squared{0, 0, 0};
-    int samples = 0;
+    cv::Vec3d by_radiance{0, 0, 0}, squared{0, 0, 0};
 
     bool tells(int channel) const { return squared[channel] > smallest_evidence; }
-    double albedo(int channel) const { return std::max(0.0, by_radiance[channel] / squared[channel]); }
-    /// Sum of squares that the curve times that albedo leaves.
-    double left_over(int channel) const {
-        return std::max(0.0, radiance_squared[channel] - by_radiance[channel] * albedo(channel));
+    /// Drawn towards `mean` as by `weight` of evidence for it, and without one sample of those summed up.
+    double albedo(int channel, double mean, double weight, double shading = 0, double radiance = 0) const {
+        const double evidence = squared[channel] - shading * shading + weight;
+        if (!(evidence > smallest_evidence)) return mean;
+        return std::max(0.0, (by_radiance[channel] - shading * radiance + weight * mean) / evidence);
     }
 };
 
@@ -99,53 +100,57 @@ Evidence evidence_of(const GainCurve& curve, const Views& views, cv::Point pixel
         const cv::Vec3d shading = curve.shading(r);
         evidence.by_radiance += shading.mul(radiance);
         evidence.squared += shading.mul(shading);
-        evidence.radiance_squared += radiance.mul(radiance);
-        ++evidence.samples;
     });
     return evidence;
 }
 
-/// How a texel's pixels differ in albedo, and how uncertainly each is told, in one channel.
-struct Spread {
-    double mean = 0;
-    double variance = 0;         ///< of the albedo itself, without what the samples' scatter makes of it
-    double sample_variance = 0;  ///< of one sample about the curve
-
-    Spread(const std::vector<Evidence>& pixels, int channel) {
-        double count = 0, left_over = 0, freedom = 0, uncertainty = 0;
-        for (const Evidence& pixel : pixels) {
-            if (!pixel.tells(channel)) continue;
-            mean += pixel.albedo(channel);
-            left_over += pixel.left_over(channel);
-            freedom += pixel.samples - 1;
-            uncertainty += 1 / pixel.squared[channel];
-            ++count;
+/// How far a texel's pixels are drawn towards its common albedo: as far as predicts best each sample from the others of
+/// its pixel (cross-validation, Stone 1974; in closed form, since the albedo is linear in the samples). Without one
+/// sample means without one photograph, as each photograph shows a pixel once.
+class Drawing {
+public:
+    Drawing(const GainCurve& curve, const Views& views, const Pixels& pixels, const std::vector<Evidence>& evidence) {
+        Evidence whole;
+        for (const Evidence& pixel : evidence) {
+            whole.by_radiance += pixel.by_radiance;
+            whole.squared += pixel.squared;
         }
-        if (!(count > 1 && freedom > 0)) return;
-        mean /= count;
-        sample_variance = left_over / freedom;
-        double scatter = 0;
-        for (const Evidence& pixel : pixels)
-            if (pixel.tells(channel)) scatter += std::pow(pixel.albedo(channel) - mean, 2);
-        variance = std::max(0.0, (scatter - sample_variance * uncertainty) / count);
+        for (int c = 0; c < 3; ++c) mean_[c] = whole.albedo(c, 0, 0);
+        std::array<cv::Vec3d, weights.size()> missed{};
+        for (std::size_t i = 0; i < pixels.size(); ++i)
+            for_samples(views, pixels[i], [&](double r, const cv::Vec3d& radiance) {
+                const cv::Vec3d shading = curve.shading(r);
+                for (std::size_t w = 0; w < weights.size(); ++w)
+                    for (int c = 0; c < 3; ++c) {
+                        const double albedo = evidence[i].albedo(c, mean_[c], weights[w], shading[c], radiance[c]);
+                        missed[w][c] += std::pow(radiance[c] - shading[c] * albedo, 2);
+                    }
+            });
+        for (int c = 0; c < 3; ++c)
+            for (std::size_t w = 1; w < weights.size(); ++w)
+                if (missed[w][c] < missed[best_[c]][c]) best_[c] = w;
     }
 
-    /// The pixel's albedo drawn towards the texel's mean as far as it is uncertain (James and Stein 1961).
     double albedo(const Evidence& pixel, int channel) const {
-        const double uncertain = sample_variance / pixel.squared[channel];
-        if (!(uncertain > 0)) return pixel.albedo(channel);
-        return mean + variance / (variance + uncertain) * (pixel.albedo(channel) - mean);
+        return pixel.albedo(channel, mean_[channel], weights[best_[channel]]);
     }
+
+private:
+    /// Of the common albedo, as if it were that sum of S(k, r)^2 in samples: from nothing to nothing but that albedo.
+    /// A photograph that the pixel faces squarely counts 1.
+    static constexpr std::array<double, 14> weights{0, 0.01, 0.03, 0.1, 0.2, 0.4, 0.8, 1.6, 3, 6, 12, 50, 200, 1e9};
+
+    cv::Vec3d mean_{0, 0, 0};
+    std::array<std::size_t, 3> best_{};
 };
 
 void measure_albedo(const GainCurve& curve, const Views& views, const Pixels& pixels, AlbedoMap& albedo) {
     std::vector<Evidence> evidence;
     for (const cv::Point& pixel : pixels) evidence.push_back(evidence_of(curve, views, pixel));
-    for (int c = 0; c < 3; ++c) {
-        const Spread spread(evidence, c);
-        for (std::size_t i = 0; i < pixels.size(); ++i)
-            if (evidence[i].tells(c)) albedo.albedo(pixels[i])[c] = static_cast<float>(spread.albedo(evidence[i], c));
-    }
+    const Drawing drawing(curve, views, pixels, evidence);
+    for (std::size_t i = 0; i < pixels.size(); ++i)
+        for (int c = 0; c < 3; ++c)
+            if (evidence[i].tells(c)) albedo.albedo(pixels[i])[c] = static_cast<float>(drawing.albedo(evidence[i], c));
 }
 
 void measure_texel(const Views& views, const Pixels& pixels, int row, ShadingResult& result) {

@@ -17,10 +17,10 @@ struct ShadingOptions {
 struct ShadingResult {
     ShadingMaps maps;
     /// What Lookup::detail is to scale a texel's radiance by: each pixel's albedo under its texel's map, the factor of
-    /// S(k, r) / mean albedo that misses the pixel's samples least, drawn towards its texel's mean as far as the
-    /// samples leave it uncertain. Unlike the unshaded image it knows what the
-    /// material does that Lambert's law does not, and that some pixels mostly lie in their neighbours' shadow. Of the
-    /// given albedo's validity; where a pixel has no samples it is the given one.
+    /// S(k, r) / mean albedo that misses the pixel's samples least, drawn towards what all of the texel's samples say
+    /// as far as that predicts samples best that are left out. Unlike the unshaded image it knows what the material
+    /// does that Lambert's law does not, and that some pixels mostly lie in their neighbours' shadow. Of the given
+    /// albedo's validity; where a pixel has no samples it is the given one.
     AlbedoMap albedo;
     double seconds = 0;
 };

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "processing/normals/semi_calibrated.h"
 #include "tests/processing/normals/lit_sphere.h"
 #include "tests/support/textured_sphere.h"
 #include "tests/support/throws.h"
@@ -56,9 +57,10 @@ TEST(HeldOut, NearLightsFallOnTheSurface) {
     PhotometricStereoOptions options;
     options.geometry = {sphere.view(), sphere.height_mm()};
     const auto reference = photometric_stereo(sphere.stack, sphere.lights, options);
-    for (const HeldOutLight& light :
-         leave_one_light_out(sphere.stack, sphere.lights, reference, {lambert_predictor()}, options)) {
-        EXPECT_LT(light.errors.at(0)[all]->rmse_relative, 1e-4) << light.file;
+    for (const HeldOutLight& light : leave_one_light_out(
+             sphere.stack, sphere.lights, reference,
+             {lambert_predictor(), darkbox_predictor(Lookup::thesis), darkbox_predictor(Lookup::detail)}, options)) {
+        for (const PredictionErrors& errors : light.errors) EXPECT_LT(errors[all]->rmse_relative, 1e-4) << light.file;
         EXPECT_FALSE(light.errors[0][shadowed] || light.errors[0][highlight]);
     }
 }
@@ -95,6 +97,36 @@ TEST(HeldOut, NothingOfTheHeldOutPhotographIsLearnt) {
     leave_one_light_out(scene.stack, scene.lights, reference, {spy});
     ASSERT_EQ(normals.size(), 2u);
     EXPECT_EQ(std::memcmp(normals[0].data, normals[1].data, normals[0].total() * sizeof(cv::Vec3f)), 0);
+}
+
+TEST(HeldOut, EstimatedIntensitiesAreEstimatedAgainWithoutTheHeldOutPhotograph) {
+    test::TexturedSphere scene = fully_lit_sphere();
+    std::vector<Eigen::Vector3d> intensities;
+    const Predictor spy{"spy", [&](const HeldOutTraining& training, const Light& light, const WorkContext&) {
+                            for (const Light& other : training.lights)
+                                if (light.file == "ring-3.png" && other.used) intensities.push_back(other.intensity);
+                            return std::optional(training.stack.images.front());
+                        }};
+    const auto record = [&] {
+        scene.lights = estimate_intensities(scene.stack, scene.lights).lights;
+        leave_one_light_out(scene.stack, scene.lights, photometric_stereo(scene.stack, scene.lights), {spy}, {},
+                            HeldOutIntensities::estimated);
+    };
+    record();
+    const double whole = scene.lights[0].intensity[0];
+    scene.stack.images[3] += scene.stack.images[5];
+    record();
+    EXPECT_GT(std::abs(scene.lights[0].intensity[0] - whole), 1e-3);  // there was something to leak
+    ASSERT_EQ(intensities.size(), 14u);
+    for (std::size_t i = 0; i < 7; ++i) EXPECT_EQ(intensities[i], intensities[i + 7]) << i;
+}
+
+TEST(HeldOut, PredictsExactlyWithEstimatedIntensities) {
+    test::TexturedSphere scene = fully_lit_sphere();
+    scene.lights = estimate_intensities(scene.stack, scene.lights).lights;
+    const auto lights = leave_one_light_out(scene.stack, scene.lights, photometric_stereo(scene.stack, scene.lights),
+                                            {lambert_predictor()}, {}, HeldOutIntensities::estimated);
+    for (const HeldOutLight& light : lights) EXPECT_LT(light.errors.at(0)[all]->rmse_relative, 1e-4) << light.file;
 }
 
 TEST(HeldOut, PredictorsStandBesideEachOther) {
@@ -164,15 +196,20 @@ TEST(HeldOut, ALightThatTheOthersCannotDoWithoutHasNoErrors) {
 
 TEST(HeldOut, IsTheSameOnAnyNumberOfThreads) {
     const test::TexturedSphere scene = test::textured_sphere(64, 8);
-    std::vector<double> errors[2];
-    for (const int threads : {1, 3}) {
+    const auto errors_on = [&scene](int threads) {
         WorkContext work;
         work.threads = threads;
-        const auto lights = leave_one_light_out(
-            scene.stack, scene.lights, photometric_stereo(scene.stack, scene.lights), {lambert_predictor()}, {}, work);
-        for (const HeldOutLight& light : lights) errors[threads / 3].push_back(light.errors[0][all]->rmse_relative);
-    }
-    EXPECT_EQ(errors[0], errors[1]);
+        std::vector<double> errors;
+        for (const HeldOutLight& light :
+             leave_one_light_out(scene.stack, scene.lights, photometric_stereo(scene.stack, scene.lights),
+                                 every_predictor(), {}, HeldOutIntensities::estimated, work))
+            for (const PredictionErrors& of : light.errors) errors.push_back(of[all]->rmse_relative);
+        return errors;
+    };
+    const std::vector<double> one = errors_on(1);
+    EXPECT_EQ(one.size(), 8u * 4u);
+    EXPECT_EQ(errors_on(2), one);
+    EXPECT_EQ(errors_on(8), one);
 }
 
 TEST(HeldOut, ThreeLightsAreTooFew) {

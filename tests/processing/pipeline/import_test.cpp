@@ -162,9 +162,15 @@ TEST_F(Import, RtiFolderWithLpRunsFromEndToEnd) {
          {"calibration/lights.json", "calibration/lights.lp", "results/normals.exr", "results/normals.png",
           "results/albedo.exr", "results/albedo.png", "results/confidence.exr", "results/height.exr",
           "results/surface.ply", "texels/index.png", "texels/texels.json", "shading/shading_maps.exr",
-          "shading/shading.json", "report.html", "results/relit-left.png"})
+          "shading/shading.json", "shading/albedo.exr", "report.html", "results/relit-left.png"})
         EXPECT_TRUE(fs::exists(session.folder() / made)) << made;
     session.verify();
+    const RelightScene shaded = load_shaded_scene(session), unshaded = load_scene(session);
+    EXPECT_EQ(cv::norm(shaded.albedo.valid, unshaded.albedo.valid, cv::NORM_INF), 0);
+    EXPECT_LT(cv::norm(shaded.albedo.albedo, unshaded.albedo.albedo, cv::NORM_RELATIVE | cv::NORM_L2), 0.05);
+    EXPECT_GT(cv::norm(shaded.albedo.albedo, unshaded.albedo.albedo, cv::NORM_INF), 0);
+    fs::remove(session.folder() / "shading/albedo.exr");
+    EXPECT_THAT(input_error_of([&] { load_shaded_scene(session); }), HasSubstr("albedo.exr"));
 
     export_session(session, ExportFormat::diligent, at("diligent"));
     ImportOptions again;
