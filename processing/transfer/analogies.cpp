@@ -4,9 +4,8 @@
 #include <utility>
 
 #include "acquisition/frame/error.h"
-#include "processing/transfer/appearance.h"
-#include "processing/transfer/expected_look.h"
 #include "processing/transfer/features.h"
+#include "processing/transfer/normal_table.h"
 #include "processing/transfer/refinement.h"
 #include "processing/transfer/synthesis.h"
 
@@ -16,6 +15,12 @@ namespace {
 cv::Vec3f mean_albedo(const MapLevel& level) {
     const cv::Scalar mean = cv::mean(level.albedo, level.valid);
     return {static_cast<float>(mean[0]), static_cast<float>(mean[1]), static_cast<float>(mean[2])};
+}
+
+void read_albedo(const MapLevel& source, const cv::Mat2i& coordinates, MapLevel& target) {
+    for (int y = 0; y < coordinates.rows; ++y)
+        for (int x = 0; x < coordinates.cols; ++x)
+            if (target.valid(y, x)) target.albedo(y, x) = source.albedo(cv::Point(coordinates(y, x)));
 }
 
 /// Tells each finished row of each level once, and stops the work when that is asked for.
@@ -50,8 +55,6 @@ private:
 cv::Mat2i analogies(const MapPyramid& source, MapPyramid target, float white, const TransferOptions& options,
                     const WorkContext& work) {
     const FeatureSpace space(options, white, mean_albedo(source.front()));
-    const MapLevel& finest = source.front();
-    const ExpectedLook look(appearance_of({finest.normal, finest.valid}, {finest.albedo, finest.valid}, white));
     Progress progress(work, target);
     cv::Mat2i coordinates;
     const int coarsest = static_cast<int>(source.size()) - 1;
@@ -62,8 +65,11 @@ cv::Mat2i analogies(const MapPyramid& source, MapPyramid target, float white, co
             {source[level], has_coarser ? &source[level + 1] : nullptr, target[level],
              has_coarser ? &target[level + 1] : nullptr, coordinates, std::ldexp(options.kappa, -level)},
             space, options.seed, [&](int rows) { progress.rows_done(rows); });
-        coordinates = refine_level({source[level], target[level], look, level, white}, coordinates, options,
-                                   [&] { progress.check(); });
+        const NormalTable table(source[level]);
+        coordinates =
+            refine_level({source[level], target[level], table, nullptr, nullptr, level}, std::move(coordinates),
+                         {white, options.normal_weight}, options, [&] { progress.check(); });
+        read_albedo(source[level], coordinates, target[level]);
     }
     return coordinates;
 }

@@ -25,10 +25,8 @@ struct TransferOptions {
     double normal_sigma = 2.0;    ///< low-pass of the normals, pixels, 0...64
     double jitter = 1.0;          ///< patchmatch, preview: 0...1, how freely chunks are picked among those that fit
     double control_weight = 1.0;  ///< patchmatch: weight of the control map against albedo, 0...100
-    int passes = 6;               ///< analogies: refinement of each level, 0...64; 0 = as the thesis has them
-    double evenness = 1.0;        ///< analogies, refined: how evenly the source is to be used, 0...100
-    double colour_weight = 0.25;  ///< analogies, refined: weight of the colour that is expected for a normal, 0...100
-    std::uint64_t seed = 1;       ///< of all random choices
+    int passes = 6;  ///< refinement of each level, 0...64; 0 = Image Analogies as the thesis has them, or bare seeds
+    std::uint64_t seed = 1;  ///< of all random choices
 
     /// Throws InputError that names the field and the allowed range.
     void validate() const;

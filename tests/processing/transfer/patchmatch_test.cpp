@@ -176,7 +176,7 @@ double unbroken_courses(const cv::Mat2i& coordinates) {
     return static_cast<double>(unbroken) / on_joint;
 }
 
-TEST(Patchmatch, BricksKeepTheirCourses) {
+TEST(Refined, BricksKeepTheirCourses) {
     const TransferSource source = brick_sphere(256);
     NormalMap hills = plane_normals({256, 256});
     for (int y = 0; y < 256; ++y)
@@ -184,12 +184,18 @@ TEST(Patchmatch, BricksKeepTheirCourses) {
             const cv::Vec3d n(0.6 * std::sin(x * 0.04), 0.6 * std::cos(y * 0.035), 1);
             hills.normal(y, x) = n / cv::norm(n);
         }
-    const TransferResult seeds = transfer_texture(source, hills, by(TransferMethod::preview));
-    const TransferResult refined = transfer_texture(source, hills, by(TransferMethod::patchmatch));
-    RecordProperty("unbroken_preview", std::to_string(unbroken_courses(seeds.coordinates)));
-    RecordProperty("unbroken_patchmatch", std::to_string(unbroken_courses(refined.coordinates)));
-    EXPECT_GT(unbroken_courses(refined.coordinates), 0.97);
-    EXPECT_GT(unbroken_courses(refined.coordinates), unbroken_courses(seeds.coordinates));
+    const auto unbroken = [&](TransferMethod method) {
+        return unbroken_courses(transfer_texture(source, hills, by(method)).coordinates);
+    };
+    const double preview = unbroken(TransferMethod::preview);
+    const double patchmatch = unbroken(TransferMethod::patchmatch);
+    const double analogies = unbroken(TransferMethod::analogies);
+    RecordProperty("unbroken_preview", std::to_string(preview));
+    RecordProperty("unbroken_patchmatch", std::to_string(patchmatch));
+    RecordProperty("unbroken_analogies", std::to_string(analogies));
+    EXPECT_GT(patchmatch, 0.97);
+    EXPECT_GT(patchmatch, preview);
+    EXPECT_GT(analogies, 0.97);
 }
 
 TEST(Patchmatch, SeedsDiffer) {
