@@ -66,9 +66,8 @@ cv::Mat2i analogies(const MapPyramid& source, MapPyramid target, float white, co
              has_coarser ? &target[level + 1] : nullptr, coordinates, std::ldexp(options.kappa, -level)},
             space, options.seed, [&](int rows) { progress.rows_done(rows); });
         const NormalTable table(source[level]);
-        coordinates =
-            refine_level({source[level], target[level], table, nullptr, nullptr, level}, std::move(coordinates),
-                         {white, options.normal_weight}, options, [&] { progress.check(); });
+        coordinates = refine_level({source[level], target[level], table, nullptr, nullptr, level}, coordinates,
+                                   {white, options.normal_weight}, options, [&] { progress.check(); });
         read_albedo(source[level], coordinates, target[level]);
     }
     return coordinates;

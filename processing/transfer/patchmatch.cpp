@@ -1,7 +1,6 @@
 #include "processing/transfer/patchmatch.h"
 
 #include <algorithm>
-#include <utility>
 
 #include "processing/transfer/normal_table.h"
 #include "processing/transfer/refinement.h"
@@ -31,7 +30,7 @@ cv::Mat2i patchmatch(const GuidedPyramid& source, const GuidedPyramid& target, c
         coordinates = level == levels - 1 ? seed_coordinates(from, table, onto, seed_options(options))
                                           : refined_coordinates(coordinates, from.valid, onto.valid);
         coordinates = refine_level({from, onto, table, source.control_at(level), target.control_at(level), level},
-                                   std::move(coordinates), code, options, pass_done);
+                                   coordinates, code, options, pass_done);
     }
     return coordinates;
 }

@@ -4,7 +4,7 @@
 
 #include <cstring>
 #include <opencv2/imgproc.hpp>
-#include <utility>
+#include <vector>
 
 #include "processing/transfer/balance.h"
 #include "processing/transfer/counter_hash.h"
@@ -32,7 +32,7 @@ cv::Mat1b whole_windows(const cv::Mat1b& valid, int window) {
 /// One level: its coordinates, and the target's bytes as they read through them.
 class LevelRefinement {
 public:
-    LevelRefinement(const RefinementLevel& level, cv::Mat2i coordinates, const TexelCode& code,
+    LevelRefinement(const RefinementLevel& level, const cv::Mat2i& coordinates, const TexelCode& code,
                     const TransferOptions& options)
         : source_(level.source),
           target_(level.target),
@@ -42,15 +42,18 @@ public:
           bin_(normal_bin_map(target_)),
           whole_(whole_windows(target_.valid, options.window)),
           balance_(source_, source_bytes_, target_, table_, level.level, balance_options(options)),
-          coordinates_(std::move(coordinates)),
-          next_(target_.valid.size()),
+          places_(static_cast<std::size_t>(target_bytes_.places()), source_bytes_.nowhere()),
+          next_(places_),
           options_(options),
           level_(level.level) {
-        tbb::parallel_for(0, coordinates_.rows, [&](int y) { read_row(y, 0, 1, coordinates_); });
+        each_valid([&](cv::Point p) {
+            next_[at(p)] = source_bytes_.place(cv::Point(coordinates(p)));
+            take_next(p);
+        });
     }
 
     void pass(int number) {
-        balance_.observe(coordinates_, target_bytes_);
+        balance_.observe(places_, target_bytes_);
         const bool last = level_ == 0 && number == options_.passes - 1;
         const float patches = patches_of(options_);
         const Refinement refinement{source_,
@@ -60,7 +63,7 @@ public:
                                     target_,
                                     target_bytes_,
                                     whole_,
-                                    coordinates_,
+                                    places_,
                                     balance_,
                                     options_.window,
                                     (last ? last_vote_weight : vote_weight) * patches,
@@ -73,7 +76,14 @@ public:
         }
     }
 
-    const cv::Mat2i& coordinates() const { return coordinates_; }
+    cv::Mat2i coordinates() const {
+        cv::Mat2i all(target_.valid.size(), cv::Vec2i(-1, -1));
+        each_valid([&](cv::Point p) {
+            const cv::Point source = source_bytes_.point(places_[at(p)]);
+            all(p) = cv::Vec2i(source.x, source.y);
+        });
+        return all;
+    }
 
 private:
     const MapLevel& source_;
@@ -84,8 +94,8 @@ private:
     cv::Mat1i bin_;
     cv::Mat1b whole_;
     TextureBalance balance_;
-    cv::Mat2i coordinates_;
-    cv::Mat2i next_;
+    std::vector<int> places_;  ///< in the source, at each place of the target
+    std::vector<int> next_;
     const TransferOptions& options_;
     int level_;
 
@@ -103,30 +113,41 @@ private:
         return balance;
     }
 
-    void read_row(int y, int first, int step, const cv::Mat2i& from) {
-        for (int x = first; x < coordinates_.cols; x += step) {
-            if (!target_.valid(y, x)) continue;
-            coordinates_(y, x) = from(y, x);
-            std::memcpy(target_bytes_.at({x, y}), source_bytes_.at(cv::Point(from(y, x))), 3);
-        }
+    std::size_t at(cv::Point p) const { return static_cast<std::size_t>(target_bytes_.place(p)); }
+
+    template <class Visit>
+    void each_valid(const Visit& visit) const {
+        tbb::parallel_for(0, target_.valid.rows, [&](int y) {
+            for (int x = 0; x < target_.valid.cols; ++x)
+                if (target_.valid(y, x)) visit(cv::Point(x, y));
+        });
+    }
+
+    void take_next(cv::Point p) {
+        places_[at(p)] = next_[at(p)];
+        std::memcpy(target_bytes_.at(p), source_bytes_.at(next_[at(p)]), 3);
     }
 
     void refine_class(const Refinement& refinement, int first_x, int first_y) {
-        const int rows = (coordinates_.rows - first_y + 1) / 2;
+        const int rows = (target_.valid.rows - first_y + 1) / 2;
         tbb::parallel_for(0, rows, [&](int i) {
             const int y = first_y + 2 * i;
-            refine_row(refinement, y, first_x, next_.ptr<cv::Vec2i>(y));
+            refine_row(refinement, y, first_x, next_.data() + at({0, y}));
         });
-        tbb::parallel_for(0, rows, [&](int i) { read_row(first_y + 2 * i, first_x, 2, next_); });
+        tbb::parallel_for(0, rows, [&](int i) {
+            const int y = first_y + 2 * i;
+            for (int x = first_x; x < target_.valid.cols; x += 2)
+                if (target_.valid(y, x)) take_next({x, y});
+        });
     }
 };
 
 }  // namespace
 
-cv::Mat2i refine_level(const RefinementLevel& level, cv::Mat2i coordinates, const TexelCode& code,
+cv::Mat2i refine_level(const RefinementLevel& level, const cv::Mat2i& coordinates, const TexelCode& code,
                        const TransferOptions& options, const PassDone& pass_done) {
     if (options.passes == 0) return coordinates;
-    LevelRefinement refinement(level, std::move(coordinates), code, options);
+    LevelRefinement refinement(level, coordinates, code, options);
     for (int pass = 0; pass < options.passes; ++pass) {
         refinement.pass(pass);
         pass_done();

@@ -28,7 +28,7 @@ using PassDone = std::function<void()>;
 /// that are even or odd in x and y; within a class all pixels look at the state before it, so they may be refined in
 /// any order: the result does not depend on the number of TBB's threads. The last pass of the finest level closes
 /// seams.
-cv::Mat2i refine_level(const RefinementLevel& level, cv::Mat2i coordinates, const TexelCode& code,
+cv::Mat2i refine_level(const RefinementLevel& level, const cv::Mat2i& coordinates, const TexelCode& code,
                        const TransferOptions& options, const PassDone& pass_done);
 
 }  // namespace darkbox
