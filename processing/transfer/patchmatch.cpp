@@ -20,8 +20,10 @@ int patchmatch_levels(int asked, cv::Size source, cv::Size target) {
 cv::Mat2i patchmatch(const GuidedPyramid& source, const GuidedPyramid& target, const TexelCode& code,
                      const TransferOptions& options, const PassesDone& passes_done) {
     const int levels = static_cast<int>(source.maps.size());
+    RefinementPlan plan;
+    if (options.passes) plan.passes = *options.passes;
     int done = 0;
-    const auto pass_done = [&] { passes_done(++done, levels * options.passes); };
+    const auto pass_done = [&] { passes_done(++done, levels * plan.passes); };
     cv::Mat2i coordinates;
     for (int level = levels - 1; level >= 0; --level) {
         const MapLevel& from = source.maps[level];
@@ -30,7 +32,7 @@ cv::Mat2i patchmatch(const GuidedPyramid& source, const GuidedPyramid& target, c
         coordinates = level == levels - 1 ? seed_coordinates(from, table, onto, seed_options(options))
                                           : refined_coordinates(coordinates, from.valid, onto.valid);
         coordinates = refine_level({from, onto, table, source.control_at(level), target.control_at(level), level},
-                                   coordinates, code, options, pass_done);
+                                   coordinates, plan, code, options, pass_done);
     }
     return coordinates;
 }

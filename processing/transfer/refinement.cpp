@@ -32,8 +32,8 @@ cv::Mat1b whole_windows(const cv::Mat1b& valid, int window) {
 /// One level: its coordinates, and the target's bytes as they read through them.
 class LevelRefinement {
 public:
-    LevelRefinement(const RefinementLevel& level, const cv::Mat2i& coordinates, const TexelCode& code,
-                    const TransferOptions& options)
+    LevelRefinement(const RefinementLevel& level, const cv::Mat2i& coordinates, const RefinementPlan& plan,
+                    const TexelCode& code, const TransferOptions& options)
         : source_(level.source),
           target_(level.target),
           source_bytes_(texel_bytes(source_, level.source_control, code)),
@@ -41,10 +41,11 @@ public:
           table_(level.table),
           bin_(normal_bin_map(target_)),
           whole_(whole_windows(target_.valid, options.window)),
-          balance_(source_, source_bytes_, target_, table_, level.level, balance_options(options)),
+          balance_(source_, source_bytes_, target_, table_, level.level, balance_options(options, plan.colour_weight)),
           places_(static_cast<std::size_t>(target_bytes_.places()), source_bytes_.nowhere()),
           next_(places_),
           options_(options),
+          passes_(plan.passes),
           level_(level.level) {
         each_valid([&](cv::Point p) {
             next_[at(p)] = source_bytes_.place(cv::Point(coordinates(p)));
@@ -54,7 +55,7 @@ public:
 
     void pass(int number) {
         balance_.observe(places_, target_bytes_);
-        const bool last = level_ == 0 && number == options_.passes - 1;
+        const bool last = level_ == 0 && number == passes_ - 1;
         const float patches = patches_of(options_);
         const Refinement refinement{source_,
                                     source_bytes_,
@@ -97,6 +98,7 @@ private:
     std::vector<int> places_;  ///< in the source, at each place of the target
     std::vector<int> next_;
     const TransferOptions& options_;
+    int passes_;
     int level_;
 
     /// How many times larger than 5 x 5 a patch is.
@@ -104,12 +106,12 @@ private:
         return static_cast<float>(options.window * options.window) / 25;
     }
 
-    static BalanceOptions balance_options(const TransferOptions& options) {
+    static BalanceOptions balance_options(const TransferOptions& options, float colour_weight) {
         BalanceOptions balance;
         const float patches = patches_of(options);
         balance.usage *= patches;
         balance.histogram *= patches;
-        balance.colour *= patches;
+        balance.colour *= patches * colour_weight;
         return balance;
     }
 
@@ -144,11 +146,11 @@ private:
 
 }  // namespace
 
-cv::Mat2i refine_level(const RefinementLevel& level, const cv::Mat2i& coordinates, const TexelCode& code,
-                       const TransferOptions& options, const PassDone& pass_done) {
-    if (options.passes == 0) return coordinates;
-    LevelRefinement refinement(level, coordinates, code, options);
-    for (int pass = 0; pass < options.passes; ++pass) {
+cv::Mat2i refine_level(const RefinementLevel& level, const cv::Mat2i& coordinates, const RefinementPlan& plan,
+                       const TexelCode& code, const TransferOptions& options, const PassDone& pass_done) {
+    if (plan.passes == 0) return coordinates;
+    LevelRefinement refinement(level, coordinates, plan, code, options);
+    for (int pass = 0; pass < plan.passes; ++pass) {
         refinement.pass(pass);
         pass_done();
     }

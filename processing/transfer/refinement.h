@@ -20,6 +20,12 @@ struct RefinementLevel {
     int level;  ///< how many times the maps were halved
 };
 
+/// How the level is refined.
+struct RefinementPlan {
+    int passes = 7;
+    float colour_weight = 1;  ///< of the smooth colour that the normals let expect
+};
+
 /// Called after each pass; may throw to stop the work.
 using PassDone = std::function<void()>;
 
@@ -28,7 +34,7 @@ using PassDone = std::function<void()>;
 /// that are even or odd in x and y; within a class all pixels look at the state before it, so they may be refined in
 /// any order: the result does not depend on the number of TBB's threads. The last pass of the finest level closes
 /// seams.
-cv::Mat2i refine_level(const RefinementLevel& level, const cv::Mat2i& coordinates, const TexelCode& code,
-                       const TransferOptions& options, const PassDone& pass_done);
+cv::Mat2i refine_level(const RefinementLevel& level, const cv::Mat2i& coordinates, const RefinementPlan& plan,
+                       const TexelCode& code, const TransferOptions& options, const PassDone& pass_done);
 
 }  // namespace darkbox

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <optional>
 
 #include "acquisition/frame/progress.h"
 #include "processing/maps/maps.h"
@@ -25,7 +26,9 @@ struct TransferOptions {
     double normal_sigma = 2.0;    ///< low-pass of the normals, pixels, 0...64
     double jitter = 1.0;          ///< patchmatch, preview: 0...1, how freely chunks are picked among those that fit
     double control_weight = 1.0;  ///< patchmatch: weight of the control map against albedo, 0...100
-    int passes = 6;  ///< refinement of each level, 0...64; 0 = Image Analogies as the thesis has them, or bare seeds
+    /// Refinement of each level, 0...64; 0 = Image Analogies as the thesis has them, or patchmatch's bare seeds. None:
+    /// 7 for patchmatch, 16 for analogies.
+    std::optional<int> passes;
     std::uint64_t seed = 1;  ///< of all random choices
 
     /// Throws InputError that names the field and the allowed range.

@@ -209,9 +209,8 @@ void add_transfer_command(CommandLine& line) {
     command.add_option("--normal-weight", a->options.normal_weight, "Weight of normals against albedo")
         ->capture_default_str();
     command.add_option("--sigma", a->options.normal_sigma, "Low-pass of the normals, pixels")->capture_default_str();
-    command
-        .add_option("--passes", a->options.passes, "Refinement of each level; 0 = analogies as they are, or bare seeds")
-        ->capture_default_str();
+    command.add_option("--passes", a->options.passes,
+                       "Refinement of each level; 0 = analogies as they are, or bare seeds (default: by the method)");
     command.add_option("--seed", a->options.seed, "Seed of the random choices")->capture_default_str();
     add_relight_options(command, a->relight);
 }
