@@ -10,7 +10,7 @@
 namespace darkbox {
 
 enum class TransferMethod {
-    analogies,   ///< Image Analogies (Hertzmann et al. 2001), as the thesis has it
+    analogies,   ///< Image Analogies (Hertzmann et al. 2001), refined; as the thesis has it with 0 passes
     patchmatch,  ///< guided PatchMatch, coarse to fine, with a balance of what is used
     preview,     ///< chunks laid over the target by their normals (StyleBlit, Sykora et al. 2019); cuts show
 };
