@@ -1,24 +1,40 @@
 #include "processing/transfer/analogies.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "acquisition/frame/error.h"
-#include "processing/transfer/appearance.h"
-#include "processing/transfer/expected_look.h"
 #include "processing/transfer/features.h"
+#include "processing/transfer/normal_table.h"
 #include "processing/transfer/refinement.h"
+#include "processing/transfer/seed.h"
 #include "processing/transfer/synthesis.h"
 
 namespace darkbox {
 namespace {
+
+/// A search in scan-line order does not know how often it took what: it takes passes to make up for that.
+constexpr int default_passes = 16;
+constexpr float colour_weight = 4;
+
+/// The finest level that is synthesised where levels are refined; finer ones continue it: a causal search at full
+/// resolution would undo what the coarser levels had balanced.
+constexpr int synthesised_before_refining = 2;
 
 cv::Vec3f mean_albedo(const MapLevel& level) {
     const cv::Scalar mean = cv::mean(level.albedo, level.valid);
     return {static_cast<float>(mean[0]), static_cast<float>(mean[1]), static_cast<float>(mean[2])};
 }
 
-/// Tells each finished row of each level once, and stops the work when that is asked for.
+void read_albedo(const MapLevel& source, const cv::Mat2i& coordinates, MapLevel& target) {
+    for (int y = 0; y < coordinates.rows; ++y)
+        for (int x = 0; x < coordinates.cols; ++x)
+            if (target.valid(y, x)) target.albedo(y, x) = source.albedo(cv::Point(coordinates(y, x)));
+}
+
+/// Tells each finished row of each level once, all of a level at once where it is only refined, and stops the work when
+/// that is asked for.
 class Progress {
 public:
     Progress(const WorkContext& work, const MapPyramid& target) : work_(work) {
@@ -50,20 +66,27 @@ private:
 cv::Mat2i analogies(const MapPyramid& source, MapPyramid target, float white, const TransferOptions& options,
                     const WorkContext& work) {
     const FeatureSpace space(options, white, mean_albedo(source.front()));
-    const MapLevel& finest = source.front();
-    const ExpectedLook look(appearance_of({finest.normal, finest.valid}, {finest.albedo, finest.valid}, white));
+    const RefinementPlan plan{options.passes.value_or(default_passes), colour_weight};
     Progress progress(work, target);
     cv::Mat2i coordinates;
     const int coarsest = static_cast<int>(source.size()) - 1;
     for (int level = coarsest; level >= 0; --level) {
         progress.begin_level();
         const bool has_coarser = level < coarsest;
-        coordinates = synthesise_level(
-            {source[level], has_coarser ? &source[level + 1] : nullptr, target[level],
-             has_coarser ? &target[level + 1] : nullptr, coordinates, std::ldexp(options.kappa, -level)},
-            space, options.seed, [&](int rows) { progress.rows_done(rows); });
-        coordinates = refine_level({source[level], target[level], look, level, white}, coordinates, options,
-                                   [&] { progress.check(); });
+        if (plan.passes > 0 && level < std::min(coarsest, synthesised_before_refining)) {
+            coordinates = refined_coordinates(coordinates, source[level].valid, target[level].valid);
+        } else {
+            coordinates = synthesise_level(
+                {source[level], has_coarser ? &source[level + 1] : nullptr, target[level],
+                 has_coarser ? &target[level + 1] : nullptr, coordinates, std::ldexp(options.kappa, -level)},
+                space, options.seed, [&](int rows) { progress.rows_done(rows); });
+        }
+        if (plan.passes == 0) continue;
+        const NormalTable table(source[level]);
+        coordinates = refine_level({source[level], target[level], table, nullptr, nullptr, level}, coordinates, plan,
+                                   {white, options.normal_weight}, options, [&] { progress.check(); });
+        read_albedo(source[level], coordinates, target[level]);
+        progress.rows_done(coordinates.rows);
     }
     return coordinates;
 }

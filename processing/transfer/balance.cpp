@@ -65,22 +65,22 @@ TextureBalance::TextureBalance(const MapLevel& source, const TexelBytes& source_
       cell_sigma_(std::ldexp(options.smooth_sigma, -level - cell_shift_)),
       expected_uses_(source.valid.size(), 0.0F),
       usage_cost_(source.valid.size(), 0.0F),
-      cost_(source.valid.size(), 0.0F) {
+      cost_(static_cast<std::size_t>(source_bytes.places()), 0.0F) {
     expect_uses(table);
     expect_histograms();
     expect_colour(table);
 }
 
-void TextureBalance::observe(const cv::Mat2i& coordinates, const TexelBytes& target_bytes) {
+void TextureBalance::observe(const std::vector<int>& places, const TexelBytes& target_bytes) {
     const float share = 1 / static_cast<float>(++observations_);
-    observe_usage(coordinates, share);
+    observe_usage(places, target_bytes, share);
     observe_histograms(target_bytes, share);
     observe_colour(target_bytes);
-    tbb::parallel_for(0, cost_.rows, [&](int y) {
-        for (int x = 0; x < cost_.cols; ++x) {
+    tbb::parallel_for(0, usage_cost_.rows, [&](int y) {
+        for (int x = 0; x < usage_cost_.cols; ++x) {
             if (!source_.valid(y, x)) continue;
             const std::array<std::uint8_t, 3> value = opponent(source_bytes_.at({x, y}));
-            cost_(y, x) =
+            cost_[static_cast<std::size_t>(source_bytes_.place({x, y}))] =
                 usage_cost_(y, x) + potential_[0][value[0]] + potential_[1][value[1]] + potential_[2][value[2]];
         }
     });
@@ -139,9 +139,11 @@ void TextureBalance::expect_colour(const NormalTable& table) {
     expected_colour_ = smooth_cells(sums, counts);
 }
 
-void TextureBalance::observe_usage(const cv::Mat2i& coordinates, float share) {
+void TextureBalance::observe_usage(const std::vector<int>& places, const TexelBytes& target_bytes, float share) {
     cv::Mat1f uses(source_.valid.size(), 0.0F);
-    each_valid(target_.valid, [&](cv::Point p) { uses(cv::Point(coordinates(p))) += 1; });
+    each_valid(target_.valid, [&](cv::Point p) {
+        uses(source_bytes_.point(places[static_cast<std::size_t>(target_bytes.place(p))])) += 1;
+    });
     cv::blur(uses, uses, cv::Size(3, 3), cv::Point(-1, -1), cv::BORDER_CONSTANT);
     tbb::parallel_for(0, uses.rows, [&](int y) {
         for (int x = 0; x < uses.cols; ++x) {

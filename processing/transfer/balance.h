@@ -32,10 +32,11 @@ public:
 
     /// Takes the texture as it is now into account. Costs are means over all that was observed: all pixels answer to
     /// them at once, and would swing from one extreme to the other with each pass.
-    void observe(const cv::Mat2i& coordinates, const TexelBytes& target_bytes);
+    /// `places` are the source's at the target's places.
+    void observe(const std::vector<int>& places, const TexelBytes& target_bytes);
 
-    /// What using a source texel costs more, for all of them.
-    const cv::Mat1f& cost() const { return cost_; }
+    /// What using the texel at a source place costs more.
+    float cost(int place) const { return cost_[static_cast<std::size_t>(place)]; }
 
     /// What a byte of R, G and B costs more at a target pixel.
     const cv::Vec3f& pull(int x, int y) const { return pull_(y >> cell_shift_, x >> cell_shift_); }
@@ -55,7 +56,7 @@ private:
     cv::Mat3f expected_colour_;  ///< smooth, of each cell
     cv::Mat1f usage_cost_;
     std::array<Potential, 3> potential_{};
-    cv::Mat1f cost_;
+    std::vector<float> cost_;  ///< at the source's places
     cv::Mat3f pull_;
     int observations_ = 0;
 
@@ -63,7 +64,7 @@ private:
     void expect_uses(const NormalTable& table);
     void expect_histograms();
     void expect_colour(const NormalTable& table);
-    void observe_usage(const cv::Mat2i& coordinates, float share);
+    void observe_usage(const std::vector<int>& places, const TexelBytes& target_bytes, float share);
     void observe_histograms(const TexelBytes& target_bytes, float share);
     void observe_colour(const TexelBytes& target_bytes);
 };

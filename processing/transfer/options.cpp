@@ -29,9 +29,7 @@ void TransferOptions::validate() const {
     require_range("levels", levels, 0, 12);
     require_range("kappa", kappa, 0.0, 25.0);
     require_range("normal_weight", normal_weight, 0.0, 100.0);
-    require_range("passes", passes, 0, 64);
-    require_range("evenness", evenness, 0.0, 100.0);
-    require_range("colour_weight", colour_weight, 0.0, 100.0);
+    require_range("passes", passes.value_or(0), 0, 64);
     require_range("jitter", jitter, 0.0, 1.0);
     require_range("control_weight", control_weight, 0.0, 100.0);
     require_range("normal_sigma", normal_sigma, 0.0, 64.0);

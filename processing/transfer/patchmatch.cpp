@@ -1,138 +1,15 @@
 #include "processing/transfer/patchmatch.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
-#include <array>
-#include <cstring>
-#include <opencv2/imgproc.hpp>
 
-#include "processing/transfer/balance.h"
-#include "processing/transfer/counter_hash.h"
 #include "processing/transfer/normal_table.h"
-#include "processing/transfer/refine_row.h"
+#include "processing/transfer/refinement.h"
 #include "processing/transfer/seed.h"
 
 namespace darkbox {
 namespace {
 
 constexpr int default_levels = 3;
-constexpr int finest_passes = 6;
-constexpr int coarser_passes = 6;
-
-/// Weights of what refine_row() adds up, for patches of 5 x 5 pixels.
-constexpr float vote_weight = 40;
-constexpr float cut_cost = 340;
-
-/// The last pass of all closes seams: cuts and votes count more, and nothing new comes in but where it is far better.
-constexpr float last_vote_weight = 1.5F * vote_weight;
-constexpr float last_cut_cost = 4 * cut_cost;
-constexpr float last_incoherence = 100;
-
-int passes_at(int level) { return level == 0 ? finest_passes : coarser_passes; }
-
-cv::Mat1b whole_windows(const cv::Mat1b& valid, int window) {
-    cv::Mat1b whole;
-    cv::erode(valid, whole, cv::Mat1b(window, window, std::uint8_t{1}), cv::Point(-1, -1), 1, cv::BORDER_CONSTANT,
-              cv::Scalar(0));
-    return whole;
-}
-
-/// One level: its coordinates, and the target's bytes as they read through them.
-class LevelRefinement {
-public:
-    LevelRefinement(const GuidedPyramid& source, const GuidedPyramid& target, int level, const TexelCode& code,
-                    const TransferOptions& options)
-        : source_(source.maps[level]),
-          target_(target.maps[level]),
-          source_bytes_(texel_bytes(source_, source.control_at(level), code)),
-          target_bytes_(texel_bytes(target_, target.control_at(level), code)),
-          table_(source_),
-          bin_(normal_bin_map(target_)),
-          whole_(whole_windows(target_.valid, options.window)),
-          balance_(source_, source_bytes_, target_, table_, level, balance_options(options)),
-          next_(target_.valid.size()),
-          options_(options),
-          level_(level) {}
-
-    const NormalTable& table() const { return table_; }
-
-    void start(cv::Mat2i coordinates) {
-        coordinates_ = std::move(coordinates);
-        tbb::parallel_for(0, coordinates_.rows, [&](int y) { read_row(y, 0, 1, coordinates_); });
-    }
-
-    void pass(int number) {
-        balance_.observe(coordinates_, target_bytes_);
-        const bool last = level_ == 0 && number == passes_at(0) - 1;
-        const float patches = patches_of(options_);
-        const Refinement refinement{source_,
-                                    source_bytes_,
-                                    table_,
-                                    bin_,
-                                    target_,
-                                    target_bytes_,
-                                    whole_,
-                                    coordinates_,
-                                    balance_,
-                                    options_.window,
-                                    (last ? last_vote_weight : vote_weight) * patches,
-                                    (last ? last_cut_cost : cut_cost) * patches,
-                                    last ? last_incoherence : static_cast<float>(1 + options_.kappa),
-                                    options_.seed * 4096 + static_cast<std::uint64_t>(level_ * 256 + number * 8)};
-        for (int i = 0; i < 4; ++i) {
-            const int pixel_class = number % 2 == 0 ? i : 3 - i;
-            refine_class(refinement, pixel_class % 2, pixel_class / 2);
-        }
-    }
-
-    const cv::Mat2i& coordinates() const { return coordinates_; }
-
-private:
-    const MapLevel& source_;
-    const MapLevel& target_;
-    TexelBytes source_bytes_;
-    TexelBytes target_bytes_;
-    NormalTable table_;
-    cv::Mat1i bin_;
-    cv::Mat1b whole_;
-    TextureBalance balance_;
-    cv::Mat2i coordinates_;
-    cv::Mat2i next_;
-    const TransferOptions& options_;
-    int level_;
-
-    /// How many times larger than 5 x 5 a patch is.
-    static float patches_of(const TransferOptions& options) {
-        return static_cast<float>(options.window * options.window) / 25;
-    }
-
-    static BalanceOptions balance_options(const TransferOptions& options) {
-        BalanceOptions balance;
-        const float patches = patches_of(options);
-        balance.usage *= patches;
-        balance.histogram *= patches;
-        balance.colour *= patches;
-        return balance;
-    }
-
-    void read_row(int y, int first, int step, const cv::Mat2i& from) {
-        for (int x = first; x < coordinates_.cols; x += step) {
-            if (!target_.valid(y, x)) continue;
-            coordinates_(y, x) = from(y, x);
-            std::memcpy(target_bytes_.at({x, y}), source_bytes_.at(cv::Point(from(y, x))), 3);
-        }
-    }
-
-    void refine_class(const Refinement& refinement, int first_x, int first_y) {
-        const int rows = (coordinates_.rows - first_y + 1) / 2;
-        tbb::parallel_for(0, rows, [&](int i) {
-            const int y = first_y + 2 * i;
-            refine_row(refinement, y, first_x, next_.ptr<cv::Vec2i>(y));
-        });
-        tbb::parallel_for(0, rows, [&](int i) { read_row(first_y + 2 * i, first_x, 2, next_); });
-    }
-};
 
 }  // namespace
 
@@ -142,22 +19,20 @@ int patchmatch_levels(int asked, cv::Size source, cv::Size target) {
 
 cv::Mat2i patchmatch(const GuidedPyramid& source, const GuidedPyramid& target, const TexelCode& code,
                      const TransferOptions& options, const PassesDone& passes_done) {
-    const int coarsest = static_cast<int>(source.maps.size()) - 1;
-    int all = 0;
-    for (int level = coarsest; level >= 0; --level) all += passes_at(level);
+    const int levels = static_cast<int>(source.maps.size());
+    RefinementPlan plan;
+    if (options.passes) plan.passes = *options.passes;
     int done = 0;
+    const auto pass_done = [&] { passes_done(++done, levels * plan.passes); };
     cv::Mat2i coordinates;
-    for (int level = coarsest; level >= 0; --level) {
-        LevelRefinement refinement(source, target, level, code, options);
+    for (int level = levels - 1; level >= 0; --level) {
         const MapLevel& from = source.maps[level];
         const MapLevel& onto = target.maps[level];
-        refinement.start(level == coarsest ? seed_coordinates(from, refinement.table(), onto, seed_options(options))
-                                           : refined_coordinates(coordinates, from.valid, onto.valid));
-        for (int pass = 0; pass < passes_at(level); ++pass) {
-            refinement.pass(pass);
-            passes_done(++done, all);
-        }
-        coordinates = refinement.coordinates();
+        const NormalTable table(from);
+        coordinates = level == levels - 1 ? seed_coordinates(from, table, onto, seed_options(options))
+                                          : refined_coordinates(coordinates, from.valid, onto.valid);
+        coordinates = refine_level({from, onto, table, source.control_at(level), target.control_at(level), level},
+                                   coordinates, plan, code, options, pass_done);
     }
     return coordinates;
 }

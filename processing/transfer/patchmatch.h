@@ -25,10 +25,7 @@ using PassesDone = std::function<void(int done, int all)>;
 int patchmatch_levels(int asked, cv::Size source, cv::Size target);
 
 /// Source coordinates of every valid target pixel, (-1, -1) elsewhere: chunks of the source are laid out at the
-/// coarsest level (seed.h), then refined coarse to fine by passes over all pixels (refine_row.h) under a balance of
-/// what is used (balance.h). A pass goes through the four classes of pixels that are even or odd in x and y; within a
-/// class all pixels look at the state before it, so they may be refined in any order: the result does not depend on the
-/// number of TBB's threads.
+/// coarsest level (seed.h), then refined coarse to fine (refinement.h).
 cv::Mat2i patchmatch(const GuidedPyramid& source, const GuidedPyramid& target, const TexelCode& code,
                      const TransferOptions& options, const PassesDone& passes_done);
 

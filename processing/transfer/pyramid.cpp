@@ -1,5 +1,7 @@
 #include "processing/transfer/pyramid.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -46,9 +48,10 @@ MapLevel half_size(const MapLevel& fine) {
     const cv::Size size((fine.valid.cols + 1) / 2, (fine.valid.rows + 1) / 2);
     MapLevel coarse{cv::Mat3f(size, cv::Vec3f(0, 0, 0)), cv::Mat3f(size, cv::Vec3f(0, 0, 0)),
                     cv::Mat1b(size, std::uint8_t{0})};
-    for (int y = 0; y < size.height; ++y)
+    tbb::parallel_for(0, size.height, [&](int y) {
         for (int x = 0; x < size.width; ++x)
             if (any_child(fine.valid, x, y)) set_parent(fine, x, y, coarse);
+    });
     return coarse;
 }
 
@@ -59,11 +62,12 @@ NormalMap low_pass(const NormalMap& normals, double sigma) {
     normals.normal.copyTo(smooth.normal, normals.valid);
     // Dividing by the blurred mask would only change lengths, and the normals are made unit anyway.
     if (sigma > 0) cv::GaussianBlur(smooth.normal, smooth.normal, cv::Size(), sigma, sigma, cv::BORDER_CONSTANT);
-    for (int y = 0; y < smooth.normal.rows; ++y)
+    tbb::parallel_for(0, smooth.normal.rows, [&](int y) {
         for (int x = 0; x < smooth.normal.cols; ++x) {
             cv::Vec3f& n = smooth.normal(y, x);
             n = smooth.valid(y, x) ? made_unit(n) : cv::Vec3f(0, 0, 0);
         }
+    });
     return smooth;
 }
 

@@ -46,28 +46,44 @@ public:
           row_bytes_(refinement.window * channels_),
           runs_((row_bytes_ + run - 1) / run) {
         for (int j = 0; j < r_.window; ++j) std::fill_n(whole_row(whole_.data(), j), row_bytes_, std::uint8_t{255});
+        const auto step = [](cv::Point by, const TexelBytes& bytes) { return by.y * bytes.pitch() + by.x; };
+        for (std::size_t i = 0; i < neighbours.size(); ++i) {
+            target_step_[i] = step(neighbours[i], r_.target_bytes);
+            source_step_[i] = step(neighbours[i], r_.source_bytes);
+        }
+        std::size_t around = 0;
+        for (int j = -near; j <= near; ++j)
+            for (int i = -near; i <= near; ++i) {
+                if (i == 0 && j == 0) continue;
+                target_around_[around] = step({i, j}, r_.target_bytes);
+                source_around_[around++] = step({i, j}, r_.source_bytes);
+            }
     }
 
-    cv::Vec2i pixel(cv::Point p) {
+    int pixel(cv::Point p) {
         const auto random = [&](std::uint64_t n) {
             return counter_hash(static_cast<std::uint32_t>(p.x), static_cast<std::uint32_t>(p.y), r_.random + n);
         };
         // Far away in memory: asked for now, needed only later.
-        const cv::Point alike = r_.table.pick(r_.bin(p), random(0));
+        const int alike = r_.source_bytes.place(r_.table.pick(r_.bin(p), random(0)));
         hwy::Prefetch(r_.source_bytes.at(alike));
+        const int* at = r_.places.data() + r_.target_bytes.place(p);
         read_patch(p);
-        take_vote(p);
+        take_vote(at);
         pull_ = r_.balance.pull(p.x, p.y);
-        read_continuations(p);
-        best_ = cv::Point(r_.coordinates(p));
+        for (std::size_t i = 0; i < neighbours.size(); ++i) continued_[i] = at[target_step_[i]] - source_step_[i];
+        best_ = *at;
         least_ = cost(best_, std::numeric_limits<float>::infinity());
         tried_count_ = 0;
         tried_[tried_count_++] = best_;
-        for (const cv::Point& offset : neighbours)
-            if (r_.target.has(p + offset)) consider(cv::Point(r_.coordinates(p + offset)) - offset, 1);
+        for (const int continued : continued_) consider(continued, 1);
         consider(alike, r_.incoherence);
-        for (std::uint64_t i = 1; i <= 2; ++i) consider(best_ + random_offset(random(i)), r_.incoherence);
-        return {best_.x, best_.y};
+        for (std::uint64_t i = 1; i <= 2; ++i) {
+            // Beyond an end of its row a step goes on at the other end: as good a guess.
+            const int guess = best_ + random_step(random(i));
+            if (guess >= 0 && guess < r_.source_bytes.places()) consider(guess, r_.incoherence);
+        }
+        return best_;
     }
 
 private:
@@ -86,10 +102,14 @@ private:
     std::array<float, 3> vote_{};
     float vote_weight_ = 0;
     cv::Vec3f pull_;
-    std::array<cv::Point, 4> continued_;
-    cv::Point best_;
+    std::array<int, 12> target_step_;
+    std::array<int, 12> source_step_;
+    std::array<int, 24> target_around_;  ///< steps to the neighbours whose patches vote
+    std::array<int, 24> source_around_;
+    std::array<int, 12> continued_;  ///< what continues the neighbours' patches; for those outside not in the source
+    int best_ = 0;
     float least_ = 0;
-    std::array<cv::Point, 24> tried_;
+    std::array<int, 16> tried_;
     std::size_t tried_count_ = 0;
 
     template <class Byte>
@@ -116,29 +136,22 @@ private:
         return patch_.counts.data();
     }
 
-    /// Where the patches of the four neighbours go on; nowhere for those outside, which nothing continues.
-    void read_continuations(cv::Point p) {
-        for (std::size_t i = 0; i < continued_.size(); ++i) {
-            const cv::Point offset = neighbours[i];
-            continued_[i] = r_.target.has(p + offset) ? cv::Point(r_.coordinates(p + offset)) - offset
-                                                      : cv::Point(std::numeric_limits<int>::min(), 0);
-        }
-    }
-
-    void take_vote(cv::Point p) {
-        std::array<int, 3> sum{};
+    /// Bytes that are not there are 0 and do not count.
+    void take_vote(const int* at) {
+        std::uint32_t red_blue = 0;
+        std::uint32_t green = 0;
         int count = 0;
-        for (int j = -near; j <= near; ++j)
-            for (int i = -near; i <= near; ++i) {
-                if ((i == 0 && j == 0) || !r_.target.has({p.x + i, p.y + j})) continue;
-                const cv::Point at = cv::Point(r_.coordinates(p.y + j, p.x + i)) - cv::Point(i, j);
-                if (!r_.source.has(at)) continue;
-                const std::uint8_t* rgb = r_.source_bytes.at(at);
-                for (std::size_t c = 0; c < 3; ++c) sum[c] += rgb[c];
-                ++count;
-            }
+        for (std::size_t i = 0; i < target_around_.size(); ++i) {
+            const int place = at[target_around_[i]] - source_around_[i];
+            std::uint32_t rgb = 0;
+            std::memcpy(&rgb, r_.source_bytes.at(place), sizeof rgb);
+            red_blue += rgb & 0xff00ffU;
+            green += rgb >> 8 & 0xffU;
+            count += r_.source_bytes.has(place) ? 1 : 0;
+        }
         vote_weight_ = count > 0 ? r_.vote_weight : 0;
         if (count == 0) return;
+        const std::array<std::uint32_t, 3> sum{red_blue & 0xffffU, green, red_blue >> 16};
         std::uint8_t* centre = whole_row(patch_.value.data(), half_) + static_cast<std::ptrdiff_t>(half_) * channels_;
         for (std::size_t c = 0; c < 3; ++c) {
             vote_[c] = static_cast<float>(sum[c]) / static_cast<float>(count);
@@ -146,15 +159,16 @@ private:
         }
     }
 
-    static cv::Point random_offset(std::uint32_t random) {
+    int random_step(std::uint32_t random) const {
         const int radius = 2 << ((random >> 28) % 5);
         const std::uint32_t span = static_cast<std::uint32_t>(2 * radius + 1);
-        return {static_cast<int>((random & 0x3fffU) % span) - radius,
-                static_cast<int>((random >> 14 & 0x3fffU) % span) - radius};
+        const int x = static_cast<int>(((random & 0x3fffU) * span) >> 14) - radius;
+        const int y = static_cast<int>(((random >> 14 & 0x3fffU) * span) >> 14) - radius;
+        return y * r_.source_bytes.pitch() + x;
     }
 
-    void consider(cv::Point source, float factor) {
-        if (!r_.source.has(source)) return;
+    void consider(int source, float factor) {
+        if (!r_.source_bytes.has(source)) return;
         for (std::size_t i = 0; i < tried_count_; ++i)
             if (tried_[i] == source) return;
         tried_[tried_count_++] = source;
@@ -165,23 +179,23 @@ private:
     }
 
     /// At least `limit` where it is not less than that.
-    float cost(cv::Point source, float limit) const {
+    float cost(int source, float limit) const {
         const std::uint8_t* rgb = r_.source_bytes.at(source);
-        float apart = r_.balance.cost()(source);
+        float apart = r_.balance.cost(source);
         for (int c = 0; c < 3; ++c) {
             const auto value = static_cast<float>(rgb[c]);
             const float off = value - vote_[static_cast<std::size_t>(c)];
             apart += vote_weight_ * off * off + pull_[c] * value;
         }
-        for (const cv::Point& continued : continued_) apart += source == continued ? 0 : r_.cut;
+        for (std::size_t i = 0; i < 4; ++i) apart += source == continued_[i] ? 0 : r_.cut;
         if (apart >= limit) return apart;
         const float left = std::min(limit - apart, 1e9F);
         return apart + static_cast<float>(difference(source, static_cast<std::int32_t>(left) + 1));
     }
 
     /// Sum of squared byte differences of the patches; may stop in the middle once it is at least `limit`.
-    std::int32_t difference(cv::Point source, std::int32_t limit) const {
-        const std::uint8_t* s = r_.source_bytes.at({source.x - half_, source.y - half_});
+    std::int32_t difference(int source, std::int32_t limit) const {
+        const std::uint8_t* s = r_.source_bytes.at(source - half_ * (r_.source_bytes.pitch() + 1));
         const std::size_t stride = r_.source_bytes.stride();
         const int middle = (r_.window + 1) / 2;
         const std::int32_t first = rows_difference(s, stride, 0, middle);
@@ -240,9 +254,9 @@ private:
 #endif
 };
 
-void refine_row(const Refinement& refinement, int y, int first, cv::Vec2i* refined) {
+void refine_row(const Refinement& refinement, int y, int first, int* refined) {
     RowRefiner refiner(refinement);
-    for (int x = first; x < refinement.coordinates.cols; x += 2)
+    for (int x = first; x < refinement.target.valid.cols; x += 2)
         if (refinement.target.valid(y, x)) refined[x] = refiner.pixel({x, y});
 }
 
@@ -255,7 +269,7 @@ namespace darkbox {
 
 HWY_EXPORT(refine_row);
 
-void refine_row(const Refinement& refinement, int y, int first, cv::Vec2i* refined) {
+void refine_row(const Refinement& refinement, int y, int first, int* refined) {
     HWY_DYNAMIC_DISPATCH(refine_row)(refinement, y, first, refined);
 }
 

@@ -3,8 +3,9 @@
 #include <functional>
 #include <opencv2/core.hpp>
 
-#include "processing/transfer/expected_look.h"
+#include "processing/transfer/normal_table.h"
 #include "processing/transfer/pyramid.h"
+#include "processing/transfer/texel_bytes.h"
 #include "processing/transfer/transfer.h"
 
 namespace darkbox {
@@ -12,26 +13,28 @@ namespace darkbox {
 /// One level of a transfer that is to be refined.
 struct RefinementLevel {
     const MapLevel& source;
-    MapLevel& target;          ///< its albedo is written
-    const ExpectedLook& look;  ///< of the finest source
-    int level;                 ///< 0 is the finest
-    float white;               ///< albedo that is displayed as 255
+    const MapLevel& target;
+    const NormalTable& table;        ///< of the source
+    const MapLevel* source_control;  ///< the control maps as albedo; null: none
+    const MapLevel* target_control;
+    int level;  ///< how many times the maps were halved
 };
 
-/// Called before each pass; may throw to stop the work.
-using PassBegins = std::function<void()>;
+/// How the level is refined.
+struct RefinementPlan {
+    int passes = 7;
+    float colour_weight = 1;  ///< of the smooth colour that the normals let expect
+};
 
-/// Lowers the energy of texture optimisation (Kwatra et al. 2005, equation 1) over source coordinates: the sum over all
-/// pixels of the squared difference of the window around a pixel to that around its source pixel, colours as displayed
-/// and normals alike. Unlike a synthesis in scan-line order it looks at whole windows, and at what a change does to the
-/// windows of the neighbours. Two more terms keep a transfer true to its source: the blurred colour is to be what the
-/// source has where it faces the same way, and source pixels are to be used as often as normals like theirs occur on
-/// the target.
-///
-/// Candidates are what continues the neighbours, and pixels that look like it in the source (k-coherence, Tong et al.
-/// 2002), like the source by its normal, and random ones at growing distance (PatchMatch, Barnes et al. 2009). Pixels
-/// change in nine interleaved groups, those of a group at once, so the result does not depend on threads.
-cv::Mat2i refine_level(const RefinementLevel& level, const cv::Mat2i& coordinates, const TransferOptions& options,
-                       const PassBegins& pass_begins);
+/// Called after each pass; may throw to stop the work.
+using PassDone = std::function<void()>;
+
+/// Source coordinates of every valid target pixel, (-1, -1) elsewhere, better than the given ones: passes over all
+/// pixels (refine_row.h) under a balance of what is used (balance.h). A pass goes through the four classes of pixels
+/// that are even or odd in x and y; within a class all pixels look at the state before it, so they may be refined in
+/// any order: the result does not depend on the number of TBB's threads. The last pass of the finest level closes
+/// seams.
+cv::Mat2i refine_level(const RefinementLevel& level, const cv::Mat2i& coordinates, const RefinementPlan& plan,
+                       const TexelCode& code, const TransferOptions& options, const PassDone& pass_done);
 
 }  // namespace darkbox

@@ -35,7 +35,8 @@ TexelBytes::TexelBytes(cv::Size size, int channels)
     : size_(size),
       channels_(channels),
       stride_(static_cast<std::size_t>(size.width + 2 * margin) * static_cast<std::size_t>(channels)),
-      bytes_(stride_ * static_cast<std::size_t>(size.height + 2 * margin) + longest_row, std::uint8_t{0}) {}
+      bytes_(stride_ * static_cast<std::size_t>(size.height + 2 * margin) + longest_row, std::uint8_t{0}),
+      present_(static_cast<std::size_t>(places()), std::uint8_t{0}) {}
 
 TexelBytes texel_bytes(const MapLevel& level, const MapLevel* control, const TexelCode& code) {
     TexelBytes bytes(level.valid.size(), code.channels());
@@ -51,6 +52,7 @@ TexelBytes texel_bytes(const MapLevel& level, const MapLevel* control, const Tex
     tbb::parallel_for(0, bytes.size().height, [&](int y) {
         for (int x = 0; x < bytes.size().width; ++x) {
             if (!level.valid(y, x)) continue;
+            bytes.add({x, y});
             std::uint8_t* b = bytes.at({x, y});
             for (int c = 0; c < 3; ++c) {
                 b[c] = albedo_code(level.albedo(y, x)[c]);

@@ -23,19 +23,33 @@ public:
     int channels() const { return channels_; }
     std::size_t stride() const { return stride_; }
 
-    /// x and y may lie up to `margin` outside; there, and where nothing was written, every byte is 0.
-    const std::uint8_t* at(cv::Point p) const { return bytes_.data() + offset(p); }
-    std::uint8_t* at(cv::Point p) { return bytes_.data() + offset(p); }
+    /// With the margin: rows of so many texels, so many texels in all.
+    int pitch() const { return size_.width + 2 * margin; }
+    int places() const { return pitch() * (size_.height + 2 * margin); }
+    /// A texel as one number: steps to neighbours are differences of places. x and y may lie up to `margin` outside.
+    int place(cv::Point p) const { return (p.y + margin) * pitch() + p.x + margin; }
+    cv::Point point(int place) const { return {place % pitch() - margin, place / pitch() - margin}; }
+    /// A place in the margin, as are those up to 3 steps away in x and y.
+    int nowhere() const { return place({3 - margin, 3 - margin}); }
+
+    /// Whether there is a valid texel at a place of 0...places() - 1.
+    bool has(int place) const { return present_[static_cast<std::size_t>(place)] != 0; }
+    void add(cv::Point p) { present_[static_cast<std::size_t>(place(p))] = 1; }
+
+    /// Where nothing was written, every byte is 0.
+    const std::uint8_t* at(int place) const { return bytes_.data() + offset(place); }
+    const std::uint8_t* at(cv::Point p) const { return at(place(p)); }
+    std::uint8_t* at(cv::Point p) { return bytes_.data() + offset(place(p)); }
 
 private:
     cv::Size size_;
     int channels_;
     std::size_t stride_;
     std::vector<std::uint8_t> bytes_;
+    std::vector<std::uint8_t> present_;
 
-    std::size_t offset(cv::Point p) const {
-        return static_cast<std::size_t>(p.y + margin) * stride_ +
-               static_cast<std::size_t>(p.x + margin) * static_cast<std::size_t>(channels_);
+    std::size_t offset(int place) const {
+        return static_cast<std::size_t>(place) * static_cast<std::size_t>(channels_);
     }
 };
 

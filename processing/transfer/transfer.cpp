@@ -1,6 +1,7 @@
 #include "processing/transfer/transfer.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include <chrono>
 #include <cmath>
@@ -101,18 +102,20 @@ MapLevel target_level(const NormalMap& target, double sigma) {
 
 AlbedoMap read_albedo(const AlbedoMap& source, const cv::Mat2i& coordinates, const cv::Mat1b& valid) {
     AlbedoMap result{cv::Mat3f(valid.size(), cv::Vec3f(0, 0, 0)), valid.clone()};
-    for (int y = 0; y < valid.rows; ++y)
+    tbb::parallel_for(0, valid.rows, [&](int y) {
         for (int x = 0; x < valid.cols; ++x)
             if (valid(y, x)) result.albedo(y, x) = source.albedo(cv::Point(coordinates(y, x)));
+    });
     return result;
 }
 
 IndexMap read_index(const IndexMap& source, const cv::Mat2i& coordinates, const cv::Mat1b& valid) {
     if (source.texels == 0) return {};
     IndexMap result{cv::Mat1w(valid.size(), std::uint16_t{0}), source.texels};
-    for (int y = 0; y < valid.rows; ++y)
+    tbb::parallel_for(0, valid.rows, [&](int y) {
         for (int x = 0; x < valid.cols; ++x)
             if (valid(y, x)) result.label(y, x) = source.label(cv::Point(coordinates(y, x)));
+    });
     return result;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <optional>
 
 #include "acquisition/frame/progress.h"
 #include "processing/maps/maps.h"
@@ -9,7 +10,7 @@
 namespace darkbox {
 
 enum class TransferMethod {
-    analogies,   ///< Image Analogies (Hertzmann et al. 2001), as the thesis has it
+    analogies,   ///< Image Analogies (Hertzmann et al. 2001), refined; as the thesis has it with 0 passes
     patchmatch,  ///< guided PatchMatch, coarse to fine, with a balance of what is used
     preview,     ///< chunks laid over the target by their normals (StyleBlit, Sykora et al. 2019); cuts show
 };
@@ -25,10 +26,10 @@ struct TransferOptions {
     double normal_sigma = 2.0;    ///< low-pass of the normals, pixels, 0...64
     double jitter = 1.0;          ///< patchmatch, preview: 0...1, how freely chunks are picked among those that fit
     double control_weight = 1.0;  ///< patchmatch: weight of the control map against albedo, 0...100
-    int passes = 6;               ///< analogies: refinement of each level, 0...64; 0 = as the thesis has them
-    double evenness = 1.0;        ///< analogies, refined: how evenly the source is to be used, 0...100
-    double colour_weight = 0.25;  ///< analogies, refined: weight of the colour that is expected for a normal, 0...100
-    std::uint64_t seed = 1;       ///< of all random choices
+    /// Refinement of each level, 0...64; 0 = Image Analogies as the thesis has them, or patchmatch's bare seeds. None:
+    /// 7 for patchmatch, 16 for analogies.
+    std::optional<int> passes;
+    std::uint64_t seed = 1;  ///< of all random choices
 
     /// Throws InputError that names the field and the allowed range.
     void validate() const;

@@ -209,12 +209,8 @@ void add_transfer_command(CommandLine& line) {
     command.add_option("--normal-weight", a->options.normal_weight, "Weight of normals against albedo")
         ->capture_default_str();
     command.add_option("--sigma", a->options.normal_sigma, "Low-pass of the normals, pixels")->capture_default_str();
-    command.add_option("--passes", a->options.passes, "Refinement of each level; 0 = Image Analogies as they are")
-        ->capture_default_str();
-    command.add_option("--evenness", a->options.evenness, "Refinement: how evenly the source is to be used")
-        ->capture_default_str();
-    command.add_option("--colour-weight", a->options.colour_weight, "Refinement: weight of a normal's expected colour")
-        ->capture_default_str();
+    command.add_option("--passes", a->options.passes,
+                       "Refinement of each level; 0 = analogies as they are, or bare seeds (default: by the method)");
     command.add_option("--seed", a->options.seed, "Seed of the random choices")->capture_default_str();
     add_relight_options(command, a->relight);
 }

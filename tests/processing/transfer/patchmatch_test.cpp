@@ -42,9 +42,9 @@ double cover(const TransferSource& source, const cv::Mat2i& coordinates) {
     return static_cast<double>(cv::countNonZero(used)) / cv::countNonZero(source.normals.valid);
 }
 
-class FastTransfer : public testing::TestWithParam<TransferMethod> {};
+class AnyMethod : public testing::TestWithParam<TransferMethod> {};
 
-TEST_P(FastTransfer, IsTheSameOnAnyNumberOfThreads) {
+TEST_P(AnyMethod, IsTheSameOnAnyNumberOfThreads) {
     const TransferSource source = stony_sphere(96);
     NormalMap target = wavy_normals({139, 101});
     target.valid.colRange(40, 47) = std::uint8_t{0};
@@ -57,7 +57,7 @@ TEST_P(FastTransfer, IsTheSameOnAnyNumberOfThreads) {
     }
 }
 
-TEST_P(FastTransfer, UsesValidSourcePixelsOnly) {
+TEST_P(AnyMethod, UsesValidSourcePixelsOnly) {
     TransferSource source = stony_sphere(64);
     for (int y = 0; y < 64; ++y)
         for (int x = 0; x < 64; ++x) {
@@ -80,14 +80,14 @@ TEST_P(FastTransfer, UsesValidSourcePixelsOnly) {
         }
 }
 
-TEST_P(FastTransfer, FollowsTheNormals) {
+TEST_P(AnyMethod, FollowsTheNormals) {
     const TransferSource source = stony_sphere(128);
     const NormalMap target = wavy_normals({128, 128});
     const TransferResult result = transfer_texture(source, target, by(GetParam()));
     EXPECT_LT(mean_guide_error_deg(source.normals, target, result.coordinates), 9);
 }
 
-TEST_P(FastTransfer, WorksForSourcesAndTargetsOfAnyShape) {
+TEST_P(AnyMethod, WorksForSourcesAndTargetsOfAnyShape) {
     const cv::Size shapes[] = {{1, 1}, {300, 1}, {1, 300}, {3, 5000}, {17, 3}};
     for (const cv::Size size : shapes) {
         const TransferResult onto = transfer_texture(stony_sphere(48), plane_normals(size), by(GetParam()));
@@ -99,7 +99,7 @@ TEST_P(FastTransfer, WorksForSourcesAndTargetsOfAnyShape) {
     }
 }
 
-TEST_P(FastTransfer, SaysWhereTheSourceHasNoSuchNormal) {
+TEST_P(AnyMethod, SaysWhereTheSourceHasNoSuchNormal) {
     NormalMap target = plane_normals({40, 40});
     target.normal.colRange(20, 40) = cv::Vec3f(std::sin(0.7F), 0, std::cos(0.7F));
     target.valid.row(0) = std::uint8_t{0};
@@ -115,9 +115,19 @@ TEST_P(FastTransfer, SaysWhereTheSourceHasNoSuchNormal) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, FastTransfer, testing::Values(TransferMethod::patchmatch, TransferMethod::preview),
+INSTANTIATE_TEST_SUITE_P(Methods, AnyMethod,
+                         testing::Values(TransferMethod::patchmatch, TransferMethod::preview,
+                                         TransferMethod::analogies),
                          [](const auto& method) {
-                             return method.param == TransferMethod::patchmatch ? "patchmatch" : "preview";
+                             switch (method.param) {
+                                 case TransferMethod::patchmatch:
+                                     return "patchmatch";
+                                 case TransferMethod::preview:
+                                     return "preview";
+                                 case TransferMethod::analogies:
+                                     break;
+                             }
+                             return "analogies";
                          });
 
 TEST(UncoveredAngle, IsExactToADegreeOnASphere) {
@@ -176,7 +186,7 @@ double unbroken_courses(const cv::Mat2i& coordinates) {
     return static_cast<double>(unbroken) / on_joint;
 }
 
-TEST(Patchmatch, BricksKeepTheirCourses) {
+TEST(Refined, BricksKeepTheirCourses) {
     const TransferSource source = brick_sphere(256);
     NormalMap hills = plane_normals({256, 256});
     for (int y = 0; y < 256; ++y)
@@ -184,12 +194,18 @@ TEST(Patchmatch, BricksKeepTheirCourses) {
             const cv::Vec3d n(0.6 * std::sin(x * 0.04), 0.6 * std::cos(y * 0.035), 1);
             hills.normal(y, x) = n / cv::norm(n);
         }
-    const TransferResult seeds = transfer_texture(source, hills, by(TransferMethod::preview));
-    const TransferResult refined = transfer_texture(source, hills, by(TransferMethod::patchmatch));
-    RecordProperty("unbroken_preview", std::to_string(unbroken_courses(seeds.coordinates)));
-    RecordProperty("unbroken_patchmatch", std::to_string(unbroken_courses(refined.coordinates)));
-    EXPECT_GT(unbroken_courses(refined.coordinates), 0.97);
-    EXPECT_GT(unbroken_courses(refined.coordinates), unbroken_courses(seeds.coordinates));
+    const auto unbroken = [&](TransferMethod method) {
+        return unbroken_courses(transfer_texture(source, hills, by(method)).coordinates);
+    };
+    const double preview = unbroken(TransferMethod::preview);
+    const double patchmatch = unbroken(TransferMethod::patchmatch);
+    const double analogies = unbroken(TransferMethod::analogies);
+    RecordProperty("unbroken_preview", std::to_string(preview));
+    RecordProperty("unbroken_patchmatch", std::to_string(patchmatch));
+    RecordProperty("unbroken_analogies", std::to_string(analogies));
+    EXPECT_GT(patchmatch, 0.97);
+    EXPECT_GT(patchmatch, preview);
+    EXPECT_GT(analogies, 0.97);
 }
 
 TEST(Patchmatch, SeedsDiffer) {

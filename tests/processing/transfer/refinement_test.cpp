@@ -35,14 +35,6 @@ TEST(Refinement, LowersTheEnergyAndUsesMoreOfTheSource) {
     EXPECT_EQ(*refined.background, 0);
 }
 
-TEST(Refinement, EvennessIsWhatSpreadsTheUse) {
-    const TransferSource source = stony_sphere(96);
-    const NormalMap target = wavy_normals({48, 48});  // fewer pixels than the source has of such normals
-    TransferOptions uneven = with_passes(4);
-    uneven.evenness = 0;
-    EXPECT_GT(*measured(source, target, with_passes(4)).cover, 1.1 * *measured(source, target, uneven).cover);
-}
-
 TEST(Refinement, DoesNotDependOnThreads) {
     const TransferSource source = stony_sphere(64);
     const NormalMap target = wavy_normals({61, 47});

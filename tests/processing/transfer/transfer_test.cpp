@@ -191,7 +191,7 @@ TEST(Transfer, WorksForTargetsOfAnyShape) {
     }
 }
 
-TEST(Transfer, TellsItsProgressRowByRow) {
+TEST(Transfer, TellsItsProgress) {
     std::vector<ProgressUpdate> updates;
     WorkContext work;
     work.report = [&](const ProgressUpdate& update) { updates.push_back(update); };
