@@ -118,6 +118,9 @@ CameraInfo V4l2Camera::describe(const v4l2_capability& capability, const Setup& 
     info.notes.push_back(fmt::format("camera: {} by {} at {}, {} of {} x {}, {:.3f} frames a second", info.model,
                                      text(capability.driver), text(capability.bus_info), fourcc_name(format.fourcc),
                                      width, height, 1.0 / info.frame_period.count()));
+    if (format.format == PixelFormat::ycc8 || format.format == PixelFormat::rgb8)
+        info.notes.emplace_back(
+            "camera: its samples were processed for display and may not be proportional to the light");
     if (!setup.controls.absent.empty())
         info.notes.push_back(fmt::format("camera: has no {}", fmt::join(setup.controls.absent, ", ")));
     if (!setup.controls.inactive.empty())

@@ -25,8 +25,6 @@ std::uint32_t line_of(std::uint32_t fourcc, std::uint32_t width) {
 
 }  // namespace
 
-FakeVideoDevice::~FakeVideoDevice() {}
-
 int FakeVideoDevice::open(const std::string& asked) {
     if (asked != path || !plugged_) return ENOENT;
     if (open_) broken_rules.emplace_back("opened twice");

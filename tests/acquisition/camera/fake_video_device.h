@@ -2,6 +2,7 @@
 
 #include <linux/videodev2.h>
 
+#include <algorithm>
 #include <deque>
 #include <functional>
 #include <map>
@@ -16,7 +17,12 @@ namespace darkbox::test {
 class FakeTime final : public Clock {
 public:
     TimePoint now() const override { return now_; }
-    void sleep_until(TimePoint moment) override { now_ = std::max(now_, moment); }
+    void sleep_until(TimePoint moment) override {
+        now_ = std::max(now_, moment);
+        if (passed) passed(now_);
+    }
+
+    std::function<void(TimePoint)> passed;  ///< called whenever time went on
 
 private:
     TimePoint now_{std::chrono::seconds(100)};
@@ -55,7 +61,6 @@ struct FakeFrame {
 class FakeVideoDevice final : public VideoDevice {
 public:
     explicit FakeVideoDevice(FakeTime& time) : time_(time) {}
-    ~FakeVideoDevice() override;
 
     int open(const std::string& path) override;
     void close() override;
@@ -65,6 +70,7 @@ public:
     Readiness poll(Nanoseconds patience) override;
 
     void unplug() { plugged_ = false; }
+    bool plugged() const { return plugged_; }
     /// As another opening of the node: formats and controls are as the camera's power-up leaves them.
     void plug_in();
 
