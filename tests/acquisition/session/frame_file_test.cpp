@@ -137,9 +137,8 @@ TEST_P(FrameFile, RecordOfAnotherPictureIsRefused) {
 }
 
 INSTANTIATE_TEST_SUITE_P(PixelFormats, FrameFile,
-                         testing::Values(PixelFormat::grey8, PixelFormat::grey16, PixelFormat::rgb8,
-                                         PixelFormat::rgb16, PixelFormat::grbg8, PixelFormat::bggr16,
-                                         PixelFormat::ycc8),
+                         testing::Values(PixelFormat::grey8, PixelFormat::grey16, PixelFormat::rgb8, PixelFormat::rgb16,
+                                         PixelFormat::grbg8, PixelFormat::bggr16, PixelFormat::ycc8),
                          [](const auto& format) { return std::string(name(format.param)); });
 
 TEST(EncodeFrame, RefusesAFrameWhoseBytesDoNotFit) {
