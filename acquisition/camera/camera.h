@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "acquisition/frame/frame.h"
 
@@ -25,6 +26,7 @@ struct CameraInfo {
     int queue_depth = 1;     ///< buffers that may hold stale frames
     int latency_frames = 0;  ///< exposures that pass before new controls take effect
     FrameControls controls;
+    std::vector<std::string> notes;  ///< what a session should keep of it besides, in words
 };
 
 /// A source of frames. States: closed -configure-> ready -start-> streaming -stop-> ready; configure() is also good in

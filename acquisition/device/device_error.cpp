@@ -4,6 +4,7 @@
 
 #include <cerrno>
 #include <system_error>
+#include <utility>
 
 namespace darkbox {
 namespace {
@@ -38,8 +39,12 @@ DeviceError::~DeviceError() = default;
 DeadlineError::~DeadlineError() = default;
 
 void throw_errno(const std::string& call, const std::string& path, int error_number) {
+    throw_errno(call, path, error_number, hint_for(error_number));
+}
+
+void throw_errno(const std::string& call, const std::string& path, int error_number, std::string hint) {
     throw DeviceError(fmt::format("{} {}: {}", call, path, std::generic_category().message(error_number)),
-                      hint_for(error_number));
+                      std::move(hint));
 }
 
 }  // namespace darkbox

@@ -23,5 +23,7 @@ public:
 /// Turns errno into a DeviceError "CALL PATH: reason" with a hint for the common causes (permissions, full disk, gone).
 /// The only place where errno becomes an exception.
 [[noreturn]] void throw_errno(const std::string& call, const std::string& path, int error_number);
+/// With the hint of who knows the device better than errno does.
+[[noreturn]] void throw_errno(const std::string& call, const std::string& path, int error_number, std::string hint);
 
 }  // namespace darkbox

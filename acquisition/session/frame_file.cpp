@@ -95,6 +95,10 @@ void set_tags(TIFF* tiff, const Frame& frame) {
     ::TIFFSetField(tiff, TIFFTAG_MAXSAMPLEVALUE, (1 << frame.bit_depth) - 1);
     ::TIFFSetField(tiff, TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT);
     ::TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, colour ? PHOTOMETRIC_RGB : PHOTOMETRIC_MINISBLACK);
+    if (channels(frame.format) == 2) {  // chroma beside the luma, which other programs then show as grey
+        const std::uint16_t beside = EXTRASAMPLE_UNSPECIFIED;
+        ::TIFFSetField(tiff, TIFFTAG_EXTRASAMPLES, 1, &beside);
+    }
     ::TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
     ::TIFFSetField(tiff, TIFFTAG_ORIENTATION, ORIENTATION_TOPLEFT);
     ::TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_NONE);

@@ -1,10 +1,14 @@
 #include "processing/pipeline/frame_rows.h"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <opencv2/imgproc.hpp>
 
 #include "acquisition/session/frame_file.h"
+#include "processing/formats/demosaic.h"
 #include "processing/formats/picture_rows.h"
+#include "processing/formats/ycc.h"
 
 namespace darkbox {
 namespace {
@@ -21,17 +25,41 @@ public:
     int type() const override { return CV_MAKETYPE(depth_of(format_), 3); }
 
     void read(int rows, cv::Mat& samples) override {
-        Frame frame = read_frame_rows(path_, record_, {next_, rows});
+        if (const auto pattern = mosaic(format_)) {
+            demosaic(with_margins(rows), next_, *pattern, (1 << record_.bit_depth) - 1).copyTo(samples);
+        } else {
+            Frame frame = read_frame_rows(path_, record_, {next_, rows});
+            to_colour(stored(frame), samples);
+        }
         next_ += rows;
-        const cv::Mat stored(frame.height, frame.width, CV_MAKETYPE(depth_of(format_), channels(format_)),
-                             frame.pixels.data());
-        if (channels(format_) == 3)
+    }
+
+private:
+    static cv::Mat stored(Frame& frame) {
+        return {frame.height, frame.width, CV_MAKETYPE(depth_of(frame.format), channels(frame.format)),
+                frame.pixels.data()};
+    }
+
+    static void to_colour(const cv::Mat& stored, cv::Mat& samples) {
+        if (stored.channels() == 3)
             stored.copyTo(samples);
+        else if (stored.channels() == 2)
+            rgb_of_ycc(stored).copyTo(samples);
         else
             cv::merge(std::array<cv::Mat, 3>{stored, stored, stored}.data(), 3, samples);
     }
 
-private:
+    /// The next rows of a mosaic with what demosaic() needs above and below.
+    cv::Mat with_margins(int rows) const {
+        const int top = std::min(next_, demosaic_margin);
+        const int bottom = std::min(record_.height - next_ - rows, demosaic_margin);
+        Frame frame = read_frame_rows(path_, record_, {next_ - top, top + rows + bottom});
+        const cv::Mat band = stored(frame);
+        cv::Mat padded;
+        cv::copyMakeBorder(band, padded, demosaic_margin - top, demosaic_margin - bottom, 0, 0, cv::BORDER_REFLECT_101);
+        return padded;
+    }
+
     std::filesystem::path path_;
     FrameRecord record_;
     PixelFormat format_;

@@ -106,6 +106,7 @@ SessionInfo session_info(const RigDescription& rig, const CameraInfo& camera, co
     info.planned_shots = static_cast<int>(plan.shots.size());
     info.geometry = geometry_of(rig);
     info.notes.push_back(lamps_note + fmt::format("{}", fmt::join(lamps_of(plan, rig), " ")));
+    info.notes.insert(info.notes.end(), camera.notes.begin(), camera.notes.end());
     return info;
 }
 

@@ -41,9 +41,20 @@ std::size_t at(const Picture& picture, int row, int column) {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(picture.columns) + static_cast<std::size_t>(column);
 }
 
+/// Chroma says nothing of how much light there was.
+Picture luma_of(const Frame& frame) {
+    Picture picture{frame.width, frame.height, {}};
+    const std::size_t count = static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height);
+    picture.samples.reserve(count);
+    for (std::size_t i = 0; i < count; ++i)
+        picture.samples.push_back(std::to_integer<std::uint16_t>(frame.pixels[2 * i]));
+    return picture;
+}
+
 }  // namespace
 
 Picture to_picture(const Frame& frame) {
+    if (frame.format == PixelFormat::ycc8) return luma_of(frame);
     Picture picture{frame.width * channels(frame.format), frame.height, {}};
     const std::size_t count = static_cast<std::size_t>(picture.columns) * static_cast<std::size_t>(picture.rows);
     picture.samples.resize(count);

@@ -7,7 +7,8 @@
 
 namespace darkbox {
 
-/// A frame's samples in one width, rows of `columns` samples: colours of a pixel are columns of their own.
+/// A frame's samples in one width, rows of `columns` samples: colours of a pixel are columns of their own; of
+/// ycc8 the luma alone.
 struct Picture {
     int columns = 0;
     int rows = 0;

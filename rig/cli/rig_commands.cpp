@@ -8,6 +8,7 @@
 #include "acquisition/device/device_error.h"
 #include "rig/capture/capture_run.h"
 #include "rig/daemon/client.h"
+#include "rig/daemon/hardware.h"
 #include "rig/daemon/session_folder.h"
 
 namespace darkbox {
@@ -19,6 +20,7 @@ struct Arguments {
     fs::path rig;
     fs::path socket;
     fs::path folder;
+    bool camera = false;
 };
 
 DaemonClient client_for(const Arguments& a) { return DaemonClient(a.socket.empty() ? default_socket() : a.socket); }
@@ -44,6 +46,24 @@ CommandResult rig_status(const Arguments& a) {
     return result;
 }
 
+void tell_camera(const CameraInfo& camera, CommandResult& result) {
+    result.json["camera_in_effect"] = {{"model", camera.model},
+                                       {"id", camera.id},
+                                       {"width", camera.width},
+                                       {"height", camera.height},
+                                       {"format", name(camera.format)},
+                                       {"bit_depth", camera.bit_depth},
+                                       {"frame_rate", 1.0 / camera.frame_period.count()},
+                                       {"exposure_ms", camera.controls.exposure.count() * 1000},
+                                       {"gain", camera.controls.gain},
+                                       {"notes", camera.notes}};
+    result.text +=
+        fmt::format("\n{} holds: {}x{} {} of {} bits, {:.3g} frames a second, {:.4g} ms at gain {:.4g}", camera.model,
+                    camera.width, camera.height, name(camera.format), camera.bit_depth,
+                    1.0 / camera.frame_period.count(), camera.controls.exposure.count() * 1000, camera.controls.gain);
+    for (const std::string& note : camera.notes) result.text += "\n" + note;
+}
+
 CommandResult rig_check(const Arguments& a) {
     const RigDescription rig = load_rig(a.rig);
     const CapturePlan plan = plan_capture(rig);
@@ -55,6 +75,7 @@ CommandResult rig_check(const Arguments& a) {
                    {"shots", plan.shots.size()}};
     result.text = fmt::format("{} is valid: rig {}, {} {} lamps, {} camera, {} shots for all of them", a.rig.string(),
                               rig.name, rig.lamps.size(), rig.lamps_driver, rig.camera.driver, plan.shots.size());
+    if (a.camera) tell_camera(check_camera(rig), result);
     return result;
 }
 
@@ -148,9 +169,10 @@ void add_to_daemon(CommandLine& line, CLI::App& group, const char* name, const c
 void add_rig_commands(CommandLine& line) {
     CLI::App& rig = line.add_group("rig", "The rig as darkboxd sees it, and its description");
     add_to_daemon(line, rig, "status", "What darkboxd is doing", "darkbox rig status", rig_status);
-    const auto [check, check_arguments] = add(line, &rig, "check", "Check a rig.toml without touching hardware",
+    const auto [check, check_arguments] = add(line, &rig, "check", "Check a rig.toml, and its camera if asked to",
                                               "darkbox rig check --rig rig.toml", rig_check);
     check.add_option("--rig", check_arguments->rig, "The rig's description")->required();
+    check.add_flag("--camera", check_arguments->camera, "Set up the camera, too, and tell what is in effect");
 
     add_rig_plan_command(line, rig);
 

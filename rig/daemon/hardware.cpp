@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <utility>
 
+#include "acquisition/camera/v4l2_camera.h"
 #include "acquisition/device/device_error.h"
 #include "acquisition/frame/error.h"
 #include "sim/sim_rig.h"
@@ -12,6 +14,17 @@ namespace darkbox {
 namespace {
 
 using Stopwatch = std::chrono::steady_clock;
+
+V4l2Options v4l2_options(const CameraDescription& camera) {
+    V4l2Options options;
+    options.device = camera.device;
+    options.format = camera.format;
+    options.width = camera.width;
+    options.height = camera.height;
+    options.frame_rate = camera.frame_rate;
+    options.crop = camera.crop;
+    return options;
+}
 
 class SimulatedRig final : public CaptureRig {
 public:
@@ -53,18 +66,50 @@ private:
     sim::SimRig sim_;
 };
 
-void need_simulator(const std::string& what, const std::string& driver) {
-    if (driver == "sim") return;
-    throw InputError(fmt::format("this build has no {} driver \"{}\" yet", what, driver),
-                     fmt::format("use driver = \"sim\" under [{}]", what));
+/// Real devices; the lamps go first when it ends, so that a camera that hangs leaves them dark.
+class RealRig final : public CaptureRig {
+public:
+    RealRig(const RigDescription& rig, std::unique_ptr<LampArray> lamps)
+        : rig_(rig), camera_(device_, clock_, v4l2_options(rig.camera)), lamps_(std::move(lamps)) {}
+
+    CaptureOutcome capture(const CaptureRequest& request, const WorkContext& work) override {
+        const auto start = Stopwatch::now();
+        const auto [session, summary] = capture_session(request, rig_, *lamps_, camera_, clock_, work);
+        return {.session = session.folder(),
+                .frames = session.frames().size(),
+                .resumed = summary.resumed,
+                .repeated = summary.repeated,
+                .duration = Stopwatch::now() - start};
+    }
+
+    void dark() override { lamps_->dark(); }
+
+private:
+    RigDescription rig_;
+    SystemClock clock_;
+    KernelVideoDevice device_;
+    V4l2Camera camera_;
+    std::unique_ptr<LampArray> lamps_;
+};
+
+std::unique_ptr<LampArray> open_lamps(const RigDescription& rig) {
+    throw InputError(fmt::format("this build has no lamps driver \"{}\" yet", rig.lamps_driver),
+                     "use driver = \"sim\" under [lamps] and [camera]");
 }
 
 }  // namespace
 
 std::unique_ptr<CaptureRig> open_hardware(const RigDescription& rig) {
-    need_simulator("camera", rig.camera.driver);
-    need_simulator("lamps", rig.lamps_driver);
-    return std::make_unique<SimulatedRig>(rig);
+    if (rig.camera.driver == "sim") return std::make_unique<SimulatedRig>(rig);
+    return std::make_unique<RealRig>(rig, open_lamps(rig));
+}
+
+CameraInfo check_camera(const RigDescription& rig) {
+    const CameraConfig config{rig.camera.exposure, rig.camera.gain};
+    if (rig.camera.driver == "sim") return sim::SimRig::make(rig).camera().configure(config);
+    SystemClock clock;
+    KernelVideoDevice device;
+    return V4l2Camera(device, clock, v4l2_options(rig.camera)).configure(config);
 }
 
 }  // namespace darkbox

@@ -166,14 +166,43 @@ void read_intrinsics(TomlSection& section, CameraDescription& camera) {
     }
 }
 
+/// What is asked of a real camera's picture; a simulated one takes it from [sim].
+void read_mode(TomlSection& section, CameraDescription& camera) {
+    constexpr std::array keys{"format", "width", "height", "frame_rate", "crop"};
+    for (const char* key : keys)
+        if (section.has(key) && camera.driver != "v4l2")
+            section.fail(key, fmt::format("{} does not belong to driver \"{}\"", key, camera.driver),
+                         "leave it out, or set driver = \"v4l2\"");
+    camera.format = section.text("format").value_or("");
+    camera.width = static_cast<int>(section.integer("width", {1, 65'535}).value_or(0));
+    camera.height = static_cast<int>(section.integer("height", {1, 65'535}).value_or(0));
+    if ((camera.width == 0) != (camera.height == 0))
+        section.fail(camera.width == 0 ? "height" : "width", "has one of width and height",
+                     "give both, or neither for the largest picture");
+    camera.frame_rate = section.number("frame_rate", {0.01, 10'000});
+    if (const auto crop = section.numbers("crop", 4)) {
+        camera.crop.emplace();
+        for (std::size_t i = 0; i < crop->size(); ++i) {
+            const double edge = (*crop)[i];
+            if (edge < (i < 2 ? 0 : 1) || edge > 65'535 || edge != std::floor(edge))
+                section.fail("crop",
+                             fmt::format("crop holds {}; allowed: whole numbers up to 65535, a size from 1", edge),
+                             "give left, top, width and height in pixels of the sensor");
+            (*camera.crop)[i] = static_cast<int>(edge);
+        }
+    }
+}
+
 CameraDescription read_camera(TomlSection& section) {
     CameraDescription camera;
-    section.allow({"driver", "device", "exposure_ms", "gain", "intrinsics"});
+    section.allow(
+        {"driver", "device", "format", "width", "height", "frame_rate", "crop", "exposure_ms", "gain", "intrinsics"});
     camera.driver = section.choice("driver", camera.driver, {"v4l2", "sim"});
     camera.device = section.text("device").value_or("");
     camera.exposure =
         milliseconds(section.number("exposure_ms", {0.001, 60'000}).value_or(as_milliseconds(camera.exposure)));
     camera.gain = section.number("gain", {0.001, 1000}).value_or(camera.gain);
+    read_mode(section, camera);
     if (auto intrinsics = section.section("intrinsics", "[camera.intrinsics]")) read_intrinsics(*intrinsics, camera);
     if (camera.driver == "v4l2" && camera.device.empty())
         section.fail("device", "device is missing; driver \"v4l2\" needs it",

@@ -22,8 +22,13 @@ struct LampDescription {
 };
 
 struct CameraDescription {
-    std::string driver = "sim";  ///< "v4l2" or "sim"
-    std::string device;          ///< v4l2: stable id or path
+    std::string driver = "sim";              ///< "v4l2" or "sim"
+    std::string device;                      ///< v4l2: stable id or path
+    std::string format;                      ///< v4l2: its four characters, "Y16"; empty: the camera's best
+    int width = 0;                           ///< v4l2: pixels; 0 with height: the camera's largest picture
+    int height = 0;                          ///< v4l2: pixels
+    std::optional<double> frame_rate;        ///< v4l2: per second; none: the fastest that holds the exposure
+    std::optional<std::array<int, 4>> crop;  ///< v4l2: left, top, width, height on the sensor
     Seconds exposure{0.02};
     double gain = 1.0;
     std::optional<double> mm_per_pixel;                 ///< [camera.intrinsics], at the object

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <opencv2/imgproc.hpp>
 
@@ -57,6 +58,30 @@ TEST(LoadStack, WithoutALampsOffFrameTheBlackLevelIsSubtracted) {
     const PhotoStack stack = load_stack(writer.seal());
     EXPECT_NEAR(stack.images[0](5, 5)[0], 0.0, 1e-6);
     EXPECT_NEAR(stack.images[0](5, 35)[0], 1936.0 / 4031.0, 1e-6);
+}
+
+/// Read in bands, so that a mosaic whose phase were lost between two of them would show.
+TEST(LoadStack, MosaicsBecomeColours) {
+    test::TemporaryFolder folder;
+    SessionWriter writer = SessionWriter::create(folder.path() / "s", SessionInfo{});
+    Frame frame = grey_frame(0, 0);
+    frame.format = PixelFormat::gbrg16;
+    frame.height = 151;
+    frame.pixels.clear();
+    for (int y = 0; y < frame.height; ++y)
+        for (int x = 0; x < frame.width; ++x) {
+            const std::uint16_t sample = y % 2 == x % 2 ? 1000 : (y % 2 == 1 ? 2000 : 500);
+            frame.pixels.push_back(static_cast<std::byte>(sample & 255));
+            frame.pixels.push_back(static_cast<std::byte>(sample >> 8));
+        }
+    writer.add(frame, record_of(FrameKind::lit));
+    const PhotoStack stack = load_stack(writer.seal());
+    const double scale = 1.0 / (4095.0 - 64.0);
+    const cv::Vec3d expected((2000 - 64) * scale, (1000 - 64) * scale, (500 - 64) * scale);
+    double worst = 0;
+    for (const cv::Vec3f& pixel : stack.images[0])
+        worst = std::max(worst, cv::norm(cv::Vec3d(pixel) - expected, cv::NORM_INF));
+    EXPECT_LT(worst, 1e-6);
 }
 
 TEST(LoadStack, ALampsOffFrameOfAnotherExposureIsNotTaken) {

@@ -35,6 +35,12 @@ channel = 1
 position_mm = [0, 500, 700]
 )";
 
+/// A real camera's rig with `lines` in its [camera].
+std::string real(const std::string& lines) {
+    return "[rig]\nname = \"r\"\n[camera]\ndriver = \"v4l2\"\ndevice = \"cam\"\n" + lines +
+           "\n[lamps]\ndriver = \"gpio\"\n[[lamps.lamp]]\nname = \"a\"\nline = \"L1\"\nposition_mm = [0, 0, 900]\n";
+}
+
 /// The good rig with one piece of its text replaced.
 std::string with(const std::string& piece, const std::string& other) {
     std::string toml = good;
@@ -122,6 +128,33 @@ INSTANTIATE_TEST_SUITE_P(
                     BadRig{"max_on", with("channel = 1", "channel = 1\nmax_on_s = 0.02"),
                            "rig.toml:24: [[lamps.lamp]] max_on_s is 0.02; allowed: more than"},
                     BadRig{"name", with("name = \"b\"", "name = \"../b\""), "cannot be part of a file name"}));
+
+INSTANTIATE_TEST_SUITE_P(RealCamera, RigErrors,
+                         testing::Values(BadRig{"good", real("format = \"Y16\""), "no error"},
+                                         BadRig{"simulated", with("exposure_ms = 20", "frame_rate = 20"),
+                                                "rig.toml:5: [camera] frame_rate does not belong to driver \"sim\""},
+                                         BadRig{"no_height", real("width = 640"), "has one of width and height"},
+                                         BadRig{"no_width", real("height = 640"), "has one of width and height"},
+                                         BadRig{"width", real("width = 0\nheight = 2"),
+                                                "rig.toml:6: [camera] width is 0; allowed: 1 to 65535"},
+                                         BadRig{"rate", real("frame_rate = 0"), "frame_rate is 0; allowed"},
+                                         BadRig{"crop", real("crop = [0, 0, 10]"), "crop must be 4 numbers"},
+                                         BadRig{"crop_part", real("crop = [0, 0.5, 10, 10]"), "crop holds 0.5"},
+                                         BadRig{"crop_size", real("crop = [0, 0, 0, 10]"), "crop holds 0;"},
+                                         BadRig{"crop_nan", real("crop = [0, 0, 10, nan]"),
+                                                "crop has the element nan"}));
+
+TEST(RigCamera, KeysOfARealOne) {
+    const CameraDescription camera =
+        parse_rig(real("format = \"pRAA\"\nwidth = 640\nheight = 480\nframe_rate = 7.5\ncrop = [8, 16, 640, 480]"),
+                  "rig.toml")
+            .camera;
+    EXPECT_EQ(camera.format, "pRAA");
+    EXPECT_EQ(camera.width, 640);
+    EXPECT_EQ(camera.height, 480);
+    EXPECT_EQ(camera.frame_rate, 7.5);
+    EXPECT_EQ(camera.crop, (std::array{8, 16, 640, 480}));
+}
 
 INSTANTIATE_TEST_SUITE_P(
     DoNotFit, RigErrors,
