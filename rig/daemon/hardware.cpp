@@ -6,6 +6,7 @@
 
 #include "acquisition/device/device_error.h"
 #include "acquisition/frame/error.h"
+#include "rig/lamps/gpio_lamps.h"
 #include "sim/sim_rig.h"
 
 namespace darkbox {
@@ -53,18 +54,25 @@ private:
     sim::SimRig sim_;
 };
 
-void need_simulator(const std::string& what, const std::string& driver) {
-    if (driver == "sim") return;
-    throw InputError(fmt::format("this build has no {} driver \"{}\" yet", what, driver),
-                     fmt::format("use driver = \"sim\" under [{}]", what));
-}
-
 }  // namespace
 
-std::unique_ptr<CaptureRig> open_hardware(const RigDescription& rig) {
-    need_simulator("camera", rig.camera.driver);
-    need_simulator("lamps", rig.lamps_driver);
-    return std::make_unique<SimulatedRig>(rig);
+Hardware::Hardware(const RigDescription& rig) : rig_(rig) {
+    if (rig_.lamps_driver == "gpio") guardian_.emplace(gpio_request(rig_), request_gpio_lines);
+}
+
+std::unique_ptr<LampArray> Hardware::open_lamps() {
+    if (guardian_) return std::make_unique<GpioLamps>(rig_, *guardian_);
+    if (rig_.lamps_driver == "sim")
+        throw InputError("simulated lamps shine in a simulated capture alone", "darkbox capture --simulate 12");
+    throw InputError(fmt::format("this build has no lamps driver \"{}\" yet", rig_.lamps_driver),
+                     "use driver = \"gpio\" or \"sim\" under [lamps]");
+}
+
+std::unique_ptr<CaptureRig> Hardware::open() {
+    if (rig_.camera.driver != "sim")
+        throw InputError(fmt::format("this build has no camera driver \"{}\" yet", rig_.camera.driver),
+                         "use driver = \"sim\" under [camera]");
+    return std::make_unique<SimulatedRig>(rig_);
 }
 
 }  // namespace darkbox
