@@ -75,7 +75,8 @@ std::string way_on(const fs::path& session, const std::string& remedy) {
 CommandResult capture_here(const Arguments& a, const WorkContext& work) {
     const CaptureRequest request = request_for(a);
     const RigDescription description = rig_for(a, request);
-    const auto rig = open_hardware(description);
+    Hardware hardware(description);
+    const auto rig = hardware.open();
     try {
         const CaptureOutcome o = rig->capture(request, work);
         return captured(o.session.string(), o.frames, o.repeated, o.resumed, o.duration.count());

@@ -5,7 +5,6 @@
 #include <memory>
 #include <optional>
 
-#include "acquisition/device/device_error.h"
 #include "rig/capture/capture_run.h"
 #include "rig/daemon/client.h"
 #include "rig/daemon/hardware.h"
@@ -79,36 +78,6 @@ CommandResult rig_check(const Arguments& a) {
     return result;
 }
 
-CommandResult lamps_list(const Arguments& a) {
-    CommandResult result;
-    result.json = ask(client_for(a), "GET", "lamps");
-    for (const Json& lamp : result.json.at("lamps")) {
-        const auto position = lamp.at("position_mm").get<std::array<double, 3>>();
-        result.text += fmt::format("{}{:<20} at {:8.1f} {:8.1f} {:8.1f} mm", result.text.empty() ? "" : "\n",
-                                   lamp.at("name").get<std::string>(), position[0], position[1], position[2]);
-    }
-    return result;
-}
-
-/// Waits until the daemon says that the lamps are dark: an accepted request is not yet darkness.
-CommandResult lamps_dark(const Arguments& a) {
-    const DaemonClient client = client_for(a);
-    const Json accepted = ask(client, "POST", "lamps/dark");
-    DaemonClient::Json told;
-    client.follow_events(accepted.at("event"), {.event = [&](const DaemonClient::Json& event) {
-                             if (event.at("event") != "lamps") return DaemonClient::Follow::go_on;
-                             told = event;
-                             return DaemonClient::Follow::leave;
-                         }});
-    if (told.is_null())
-        throw DeviceError("darkboxd stopped before it told whether the lamps are dark", "look at the lamps");
-    if (!told.at("dark")) throw DeviceError(told.at("detail"), "cut the lamps' supply");
-    CommandResult result;
-    result.json = {{"dark", true}};
-    result.text = told.at("detail");
-    return result;
-}
-
 Json describe(const SessionListing& session) {
     return {{"name", session.name},       {"state", name(session.state)}, {"object", session.object},
             {"created", session.created}, {"frames", session.frames},     {"problem", session.problem}};
@@ -176,10 +145,7 @@ void add_rig_commands(CommandLine& line) {
 
     add_rig_plan_command(line, rig);
 
-    CLI::App& lamps = line.add_group("lamps", "The lamps of the rig");
-    add_to_daemon(line, lamps, "list", "Names and places of the lamps", "darkbox lamps list", lamps_list);
-    add_to_daemon(line, lamps, "dark", "Darken every lamp; a running capture is cancelled", "darkbox lamps dark",
-                  lamps_dark);
+    add_lamps_commands(line);
 
     const auto [list, list_arguments] =
         add(line, nullptr, "sessions", "The captured sessions", "darkbox sessions --folder sessions", sessions);

@@ -14,6 +14,9 @@ void add_capture_command(CommandLine& line);
 /// `darkbox rig`, `darkbox lamps` and `darkbox sessions`.
 void add_rig_commands(CommandLine& line);
 
+/// `darkbox lamps`.
+void add_lamps_commands(CommandLine& line);
+
 /// `darkbox rig plan`, into the group `rig`.
 void add_rig_plan_command(CommandLine& line, CLI::App& rig);
 

@@ -8,6 +8,7 @@
 #include "acquisition/camera/v4l2_camera.h"
 #include "acquisition/device/device_error.h"
 #include "acquisition/frame/error.h"
+#include "rig/lamps/gpio_lamps.h"
 #include "sim/sim_rig.h"
 
 namespace darkbox {
@@ -92,16 +93,23 @@ private:
     std::unique_ptr<LampArray> lamps_;
 };
 
-std::unique_ptr<LampArray> open_lamps(const RigDescription& rig) {
-    throw InputError(fmt::format("this build has no lamps driver \"{}\" yet", rig.lamps_driver),
-                     "use driver = \"sim\" under [lamps] and [camera]");
-}
-
 }  // namespace
 
-std::unique_ptr<CaptureRig> open_hardware(const RigDescription& rig) {
-    if (rig.camera.driver == "sim") return std::make_unique<SimulatedRig>(rig);
-    return std::make_unique<RealRig>(rig, open_lamps(rig));
+Hardware::Hardware(const RigDescription& rig) : rig_(rig) {
+    if (rig_.lamps_driver == "gpio") guardian_.emplace(gpio_request(rig_), request_gpio_lines);
+}
+
+std::unique_ptr<LampArray> Hardware::open_lamps() {
+    if (guardian_) return std::make_unique<GpioLamps>(rig_, *guardian_);
+    if (rig_.lamps_driver == "sim")
+        throw InputError("simulated lamps shine in a simulated capture alone", "darkbox capture --simulate 12");
+    throw InputError(fmt::format("this build has no lamps driver \"{}\" yet", rig_.lamps_driver),
+                     "use driver = \"gpio\" or \"sim\" under [lamps]");
+}
+
+std::unique_ptr<CaptureRig> Hardware::open() {
+    if (rig_.camera.driver == "sim") return std::make_unique<SimulatedRig>(rig_);
+    return std::make_unique<RealRig>(rig_, open_lamps());
 }
 
 CameraInfo check_camera(const RigDescription& rig) {

@@ -1,19 +1,35 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "acquisition/camera/camera.h"
 #include "rig/daemon/capture_rig.h"
+#include "rig/lamps/lamp_array.h"
+#include "rig/lamps/lamp_guardian.h"
 
 namespace darkbox {
 
-/// Opens the devices that the description asks for; after a simulated capture, what is true of it lies in the session's
-/// truth/. The one place that knows the simulator and the real drivers at once. Throws InputError for a driver that
-/// this build does not have, DeviceError when a device cannot be opened.
-std::unique_ptr<CaptureRig> open_hardware(const RigDescription& rig);
+/// The devices that a description asks for: the one place that knows the simulator and the real drivers at once. The
+/// constructor opens none of them, but forks the guardian of GPIO lamps, so it must run before any thread starts that
+/// does more than wait for signals. Thread-compatible; outlives what it opened.
+class Hardware {
+public:
+    explicit Hardware(const RigDescription& rig);
+
+    /// Lamps and camera; after a simulated capture, what is true of it lies in the session's truth/. Throws InputError
+    /// for a driver that this build does not have, DeviceError when a device cannot be opened.
+    std::unique_ptr<CaptureRig> open();
+    /// The lamps alone, dark. Throws as open(), and InputError for simulated lamps, which no one could see.
+    std::unique_ptr<LampArray> open_lamps();
+
+private:
+    const RigDescription rig_;
+    std::optional<LampGuardian> guardian_;
+};
 
 /// Opens the camera of the description alone, sets it up as for a capture, and tells what is in effect. Throws what
-/// open_hardware() throws, and InputError for settings that the camera cannot do.
+/// Hardware::open() throws, and InputError for settings that the camera cannot do.
 CameraInfo check_camera(const RigDescription& rig);
 
 }  // namespace darkbox

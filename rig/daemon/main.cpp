@@ -48,13 +48,14 @@ class Daemon {
 public:
     Daemon(RigDescription rig, const fs::path& socket, const fs::path& sessions)
         : rig_(std::move(rig)),
+          hardware_(rig_),
           signals_(io_, SIGINT, SIGTERM, SIGHUP),
           watchdog_(io_),
           leave_(io_),
           server_(
               io_, server_options(socket), [this](const ApiRequest& request) { return api_->answer(request); }, log_) {
         fs::create_directories(sessions);
-        service_.emplace([this] { return open_hardware(rig_); }, ServiceOptions{.sessions = sessions}, log_);
+        service_.emplace([this] { return hardware_.open(); }, ServiceOptions{.sessions = sessions}, log_);
         api_.emplace(rig_, *service_);
         await_signal();
         feed_watchdog();
@@ -111,6 +112,7 @@ private:
     }
 
     const RigDescription rig_;
+    Hardware hardware_;  // forks: before whatever starts a thread
     EventLog log_;
     asio::io_context io_;
     asio::signal_set signals_;

@@ -18,6 +18,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t largest_file = 1 << 20;  ///< bytes; 64 lamps need about 6000
 constexpr std::size_t most_lamps = 64;
 constexpr std::size_t longest_name = 64;
+constexpr std::size_t most_address_lines = 6;
 constexpr double nearest_lamp_mm = 10;
 constexpr double farthest_lamp_mm = 100'000;
 constexpr double farthest_principal_px = 100'000;
@@ -60,27 +61,45 @@ std::string read_lamp_name(TomlSection& section) {
     return name;
 }
 
-/// Which output of the driver the lamp hangs on: a GPIO line, or a channel of the others.
-void read_output(TomlSection& section, const std::string& driver, LampDescription& lamp) {
-    const auto line = section.text_or_digits("line");
-    const auto channel = section.integer("channel", {0, static_cast<std::int64_t>(most_lamps) - 1});
-    const std::string wanted = driver == "gpio" ? "line" : "channel";
-    const std::string other = driver == "gpio" ? "channel" : "line";
-    if (section.has(other))
-        section.fail(other, fmt::format("{} does not belong to driver \"{}\"", other, driver),
-                     fmt::format("name the lamp's output with {}", wanted));
-    if (!section.has(wanted) || (line && line->empty()))
-        section.fail(wanted, fmt::format("{} is missing; driver \"{}\" needs it", wanted, driver),
-                     fmt::format("add {} to the lamp", wanted));
-    lamp.line = line.value_or("");
-    lamp.channel = channel ? static_cast<int>(*channel) : -1;
+/// The key that says which output of the driver a lamp hangs on.
+std::string output_key(const RigDescription& rig) {
+    if (rig.lamps_driver != "gpio") return "channel";
+    return rig.gpio.multiplexer ? "address" : "line";
 }
 
-LampDescription read_lamp(TomlSection& section, const std::string& driver, Seconds exposure) {
+std::string driver_in_words(const RigDescription& rig) {
+    return fmt::format("driver \"{}\"{}", rig.lamps_driver, rig.gpio.multiplexer ? " with a multiplexer" : "");
+}
+
+void read_output(TomlSection& section, const RigDescription& rig, bool active_low, LampDescription& lamp) {
+    const std::int64_t addresses =
+        rig.gpio.multiplexer ? std::int64_t{1} << rig.gpio.multiplexer->address_lines.size() : most_lamps;
+    const auto line = section.text_or_digits("line");
+    const auto channel = section.integer("channel", {0, static_cast<std::int64_t>(most_lamps) - 1});
+    const auto address = section.integer("address", {0, addresses - 1});
+    const std::string wanted = output_key(rig);
+    for (const char* other : {"channel", "line", "address"})
+        if (other != wanted && section.has(other))
+            section.fail(other, fmt::format("{} does not belong to {}", other, driver_in_words(rig)),
+                         fmt::format("name the lamp's output with {}", wanted));
+    if (!section.has(wanted) || (line && line->empty()))
+        section.fail(wanted, fmt::format("{} is missing; {} needs it", wanted, driver_in_words(rig)),
+                     fmt::format("add {} to the lamp", wanted));
+    if (wanted != "line" && section.has("active_low"))
+        section.fail("active_low", "active_low belongs to a lamp with a line of its own",
+                     "remove it; a decoder's enable line has enable_active_low");
+    lamp.line = line.value_or("");
+    lamp.active_low = section.flag("active_low").value_or(active_low);
+    lamp.channel = static_cast<int>(channel.value_or(-1));
+    lamp.address = static_cast<int>(address.value_or(-1));
+}
+
+LampDescription read_lamp(TomlSection& section, const RigDescription& rig, bool active_low) {
     LampDescription lamp;
-    section.allow({"name", "line", "channel", "position_mm", "max_on_s", "settle_ms"});
+    section.allow({"name", "line", "active_low", "address", "channel", "position_mm", "max_on_s", "settle_ms"});
     lamp.name = read_lamp_name(section);
-    read_output(section, driver, lamp);
+    const Seconds exposure = rig.camera.exposure;
+    read_output(section, rig, active_low, lamp);
     lamp.position_mm = read_position(section);
     lamp.max_on = Seconds(section.number("max_on_s", {0.001, 600}).value_or(lamp.max_on.count()));
     lamp.settle = milliseconds(section.number("settle_ms", {0, 10'000}).value_or(as_milliseconds(lamp.settle)));
@@ -110,24 +129,71 @@ void refuse_duplicate(const std::vector<LampDescription>& lamps, Output output, 
                  fmt::format("give every lamp a {} of its own", key));
 }
 
+MultiplexerDescription read_multiplexer(TomlSection& section) {
+    MultiplexerDescription decoder;
+    section.allow({"address_lines", "enable_line", "enable_active_low"});
+    decoder.address_lines = section.texts_or_digits("address_lines");
+    if (decoder.address_lines.empty() || decoder.address_lines.size() > most_address_lines)
+        section.fail("address_lines",
+                     fmt::format("address_lines names {} lines; allowed: 1 to {}", decoder.address_lines.size(),
+                                 most_address_lines),
+                     "name the decoder's address lines, lowest bit first");
+    decoder.enable_line = section.text_or_digits("enable_line").value_or("");
+    if (decoder.enable_line.empty())
+        section.fail("enable_line", "enable_line is missing; without it some lamp is always lit",
+                     "wire the decoder's enable input to a line and name it");
+    std::vector<std::string> lines = decoder.address_lines;
+    lines.push_back(decoder.enable_line);
+    std::sort(lines.begin(), lines.end());
+    const auto twice = std::adjacent_find(lines.begin(), lines.end());
+    if (twice != lines.end())
+        section.fail("address_lines", fmt::format("line '{}' is named twice", *twice),
+                     "give every input of the decoder a line of its own");
+    decoder.enable_active_low = section.flag("enable_active_low").value_or(false);
+    return decoder;
+}
+
+/// Returns whether lamps are active low that do not say so themselves.
+bool read_gpio(TomlSection& section, GpioDescription& gpio) {
+    section.allow({"chip", "active_low", "multiplexer"});
+    gpio.chip = section.required_text("chip");
+    if (auto decoder = section.section("multiplexer", "[lamps.gpio.multiplexer]")) {
+        gpio.multiplexer = read_multiplexer(*decoder);
+        if (section.has("active_low"))
+            section.fail("active_low", "active_low is for lamps with lines of their own",
+                         "remove it; a decoder's enable line has enable_active_low");
+    }
+    return section.flag("active_low").value_or(false);
+}
+
 void read_lamps(TomlSection& section, RigDescription& rig) {
-    section.allow({"driver", "distant", "lamp"});
+    section.allow({"driver", "distant", "gpio", "lamp"});
     rig.lamps_driver = section.choice("driver", rig.lamps_driver, {"gpio", "usb", "sim"});
     const bool simulated_distant = rig.lamps_driver == "sim" && !has_word(rig.sim.scene, "near");
     rig.distant_lamps = section.flag("distant").value_or(simulated_distant);
+    bool active_low = false;
+    auto gpio = section.section("gpio", "[lamps.gpio]");
+    if (gpio && rig.lamps_driver != "gpio")
+        section.fail("gpio", fmt::format("has [lamps.gpio], but driver \"{}\"", rig.lamps_driver),
+                     "remove [lamps.gpio], or write driver = \"gpio\"");
+    if (gpio) active_low = read_gpio(*gpio, rig.gpio);
     std::vector<TomlSection> lamps = section.sections("lamp", "[[lamps.lamp]]");
     if (lamps.empty()) section.fail("lamp", "holds no lamp; allowed: 1 to 64", "add a [[lamps.lamp]] for each lamp");
     for (TomlSection& lamp : lamps) {
         if (rig.lamps.size() == most_lamps)
             lamp.fail("name", fmt::format("is one of {} lamps; allowed: 1 to {}", lamps.size(), most_lamps),
                       "describe at most 64 lamps");
-        rig.lamps.push_back(read_lamp(lamp, rig.lamps_driver, rig.camera.exposure));
+        rig.lamps.push_back(read_lamp(lamp, rig, active_low));
         refuse_duplicate(rig.lamps, [](const LampDescription& l) { return l.name; }, lamp, "name");
-        if (rig.lamps_driver == "gpio")
-            refuse_duplicate(rig.lamps, [](const LampDescription& l) { return l.line; }, lamp, "line");
-        else
-            refuse_duplicate(rig.lamps, [](const LampDescription& l) { return l.channel; }, lamp, "channel");
+        const std::string key = output_key(rig);
+        const auto output = [&](const LampDescription& l) {
+            return key == "line" ? l.line : std::to_string(key == "address" ? l.address : l.channel);
+        };
+        refuse_duplicate(rig.lamps, output, lamp, key);
     }
+    if (rig.lamps_driver == "gpio" && !gpio)
+        section.fail("gpio", "has driver \"gpio\" but no [lamps.gpio]",
+                     "add [lamps.gpio] with chip = \"LABEL\" (gpiodetect lists the labels)");
 }
 
 /// Two of scale, distance and focal length tell the third: distance = focal length times scale.

@@ -15,10 +15,25 @@ namespace darkbox {
 struct LampDescription {
     std::string name;                     ///< unique
     int channel = -1;                     ///< driver "usb" and "sim"
-    std::string line;                     ///< driver "gpio": name or offset
+    std::string line;                     ///< driver "gpio", wired directly: name or offset
+    bool active_low = false;              ///< of that line
+    int address = -1;                     ///< driver "gpio", multiplexed: what the decoder turns into this lamp
     std::array<double, 3> position_mm{};  ///< rig frame: x right, y up, z to the camera, origin at the object
     Seconds max_on{2.0};                  ///< longest continuous on-time
     Seconds settle{0.005};                ///< from switch to steady light
+};
+
+/// A binary decoder between few lines and many lamps.
+struct MultiplexerDescription {
+    std::vector<std::string> address_lines;  ///< names or offsets, lowest bit first
+    std::string enable_line;                 ///< every lamp is dark while it is inactive
+    bool enable_active_low = false;
+};
+
+/// [lamps.gpio], of driver "gpio".
+struct GpioDescription {
+    std::string chip;                                   ///< its label
+    std::optional<MultiplexerDescription> multiplexer;  ///< none: one line a lamp
 };
 
 struct CameraDescription {
@@ -63,6 +78,7 @@ struct RigDescription {
     std::string name;
     CameraDescription camera;
     std::string lamps_driver = "sim";  ///< "gpio", "usb" or "sim"
+    GpioDescription gpio;
     std::vector<LampDescription> lamps;
     bool distant_lamps = false;  ///< their light is parallel: behind collimators, or simulated so
     std::optional<double> ball_diameter_mm;

@@ -110,6 +110,23 @@ std::optional<std::string> TomlSection::text_or_digits(const std::string& key) {
     return node->as_string()->get();
 }
 
+std::vector<std::string> TomlSection::texts_or_digits(const std::string& key) {
+    const toml::node* node = find(key);
+    if (node == nullptr) return {};
+    const std::string wanted = "names in quotes or whole numbers, in brackets";
+    if (!node->is_array()) wrong_type(key, *node, wanted);
+    std::vector<std::string> texts;
+    for (const toml::node& element : *node->as_array()) {
+        if (element.is_string())
+            texts.push_back(element.as_string()->get());
+        else if (element.is_integer() && element.as_integer()->get() >= 0)
+            texts.push_back(std::to_string(element.as_integer()->get()));
+        else
+            wrong_type(key, element, wanted);
+    }
+    return texts;
+}
+
 std::string TomlSection::choice(const std::string& key, const std::string& fallback,
                                 const std::vector<std::string>& choices) {
     const std::string value = text(key).value_or(fallback);

@@ -34,6 +34,8 @@ public:
     std::string required_text(const std::string& key);
     /// A name or a number, such as a GPIO line; a number comes back as its digits.
     std::optional<std::string> text_or_digits(const std::string& key);
+    /// A list of them; empty where there is none.
+    std::vector<std::string> texts_or_digits(const std::string& key);
     std::string choice(const std::string& key, const std::string& fallback, const std::vector<std::string>& choices);
     std::optional<double> number(const std::string& key, Allowed<double> allowed);
     std::optional<std::int64_t> integer(const std::string& key, Allowed<std::int64_t> allowed);

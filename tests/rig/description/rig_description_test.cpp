@@ -118,6 +118,8 @@ TEST(RigDescription, LeavesOutWhatHasADefault) {
 TEST(RigExamples, NineLampsOnGpio) {
     const RigDescription rig = load_rig(example("gpio-9-lamps.toml"));
     EXPECT_EQ(rig.lamps_driver, "gpio");
+    EXPECT_EQ(rig.gpio.chip, "pinctrl-bcm2711");
+    EXPECT_FALSE(rig.gpio.multiplexer);
     EXPECT_EQ(rig.camera.driver, "v4l2");
     ASSERT_EQ(rig.lamps.size(), 9);
     EXPECT_EQ(rig.lamps[0].line, "GPIO17");

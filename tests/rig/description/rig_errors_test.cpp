@@ -156,6 +156,58 @@ TEST(RigCamera, KeysOfARealOne) {
     EXPECT_EQ(camera.crop, (std::array{8, 16, 640, 480}));
 }
 
+/// Four lamps on GPIO lines; `gpio` is what follows [lamps.gpio], `lamp` what follows the first lamp's name.
+std::string gpio_rig(const std::string& gpio, const std::string& lamp) {
+    return "[rig]\nname = \"bench\"\n[camera]\ndriver = \"v4l2\"\ndevice = \"/dev/video0\"\n[lamps]\n"
+           "driver = \"gpio\"\n[lamps.gpio]\n" +
+           gpio + "\n[[lamps.lamp]]\nname = \"a\"\nposition_mm = [0, 0, 900]\n" + lamp + "\n";
+}
+
+const char* const decoder =
+    "chip = \"c\"\n[lamps.gpio.multiplexer]\naddress_lines = [\"A0\", 7]\nenable_line = \"EN\"\n";
+
+TEST(GpioRig, ReadsPolarityFromTheChipOrTheLamp) {
+    EXPECT_FALSE(parse_rig(gpio_rig("chip = \"c\"", "line = 4"), "rig.toml").lamps[0].active_low);
+    EXPECT_TRUE(parse_rig(gpio_rig("chip = \"c\"\nactive_low = true", "line = 4"), "rig.toml").lamps[0].active_low);
+    const RigDescription rig =
+        parse_rig(gpio_rig("chip = \"c\"\nactive_low = true", "line = \"GPIO4\"\nactive_low = false"), "rig.toml");
+    EXPECT_FALSE(rig.lamps[0].active_low);
+    EXPECT_EQ(rig.lamps[0].line, "GPIO4");
+}
+
+TEST(GpioRig, ReadsAMultiplexer) {
+    const RigDescription rig = parse_rig(gpio_rig(decoder, "address = 3"), "rig.toml");
+    ASSERT_TRUE(rig.gpio.multiplexer);
+    EXPECT_THAT(rig.gpio.multiplexer->address_lines, testing::ElementsAre("A0", "7"));
+    EXPECT_EQ(rig.gpio.multiplexer->enable_line, "EN");
+    EXPECT_FALSE(rig.gpio.multiplexer->enable_active_low);
+    EXPECT_EQ(rig.lamps[0].address, 3);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Gpio, RigErrors,
+    testing::Values(
+        BadRig{"chip", gpio_rig("chp = \"c\"", "line = 4"),
+               "rig.toml:9: unknown key 'chp' in [lamps.gpio]; did you mean 'chip'?"},
+        BadRig{"no_chip", gpio_rig("", "line = 4"), "[lamps.gpio] chip is missing"},
+        BadRig{"active_low", gpio_rig("chip = \"c\"", "line = 4\nactive_lo = true"), "did you mean 'active_low'?"},
+        BadRig{"polarity", gpio_rig("chip = \"c\"", "line = 4\nactive_low = 1"), "active_low must be true or false"},
+        BadRig{"address_alone", gpio_rig("chip = \"c\"", "address = 1"),
+               "rig.toml:13: [[lamps.lamp]] address does not belong to driver \"gpio\""},
+        BadRig{"line_too", gpio_rig(decoder, "line = 1"), "line does not belong to driver \"gpio\" with a multiplexer"},
+        BadRig{"address_range", gpio_rig(decoder, "address = 4"), "address is 4; allowed: 0 to 3"},
+        BadRig{"no_enable", gpio_rig("chip = \"c\"\n[lamps.gpio.multiplexer]\naddress_lines = [1]", "address = 1"),
+               "enable_line is missing"},
+        BadRig{"no_address_lines", gpio_rig("chip = \"c\"\n[lamps.gpio.multiplexer]\nenable_line = 1", "address = 1"),
+               "address_lines names 0 lines; allowed: 1 to 6"},
+        BadRig{"line_twice",
+               gpio_rig("chip = \"c\"\n[lamps.gpio.multiplexer]\naddress_lines = [1]\nenable_line = 1", "address = 1"),
+               "line '1' is named twice"},
+        BadRig{"decoder_polarity", gpio_rig(decoder, "address = 1\nactive_low = true"),
+               "active_low belongs to a lamp with a line of its own"},
+        BadRig{"driver", with("[lamps]\ndriver = \"sim\"", "[lamps.gpio]\nchip = \"c\"\n[lamps]\ndriver = \"sim\""),
+               "has [lamps.gpio], but driver \"sim\""}));
+
 INSTANTIATE_TEST_SUITE_P(
     DoNotFit, RigErrors,
     testing::Values(BadRig{"same_name", with("name = \"b\"", "name = \"a\""),

@@ -1,0 +1,150 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "acquisition/device/clock.h"
+#include "acquisition/device/device_error.h"
+#include "rig/cli/rig_commands.h"
+#include "rig/daemon/client.h"
+#include "rig/daemon/hardware.h"
+
+namespace darkbox {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Arguments {
+    fs::path rig;
+    fs::path socket;
+    std::string lamp;
+    std::optional<double> seconds;
+};
+
+/// The darkboxd that runs, if one does: the lamps are its own then.
+std::optional<DaemonClient> running_daemon(const Arguments& a) {
+    const auto socket = a.socket.empty() ? known_socket() : std::optional(a.socket);
+    if (!socket) return std::nullopt;
+    DaemonClient client(*socket);
+    return client.answers() ? std::optional(std::move(client)) : std::nullopt;
+}
+
+RigDescription rig_of(const Arguments& a) {
+    if (a.rig.empty())
+        throw InputError("no darkboxd answers, and no rig is given",
+                         "start it (darkboxd --config rig.toml), or add --rig rig.toml");
+    return load_rig(a.rig);
+}
+
+Json lamps_of(const RigDescription& rig) {
+    Json list = Json::array();
+    for (const LampDescription& lamp : rig.lamps)
+        list.push_back({{"name", lamp.name}, {"position_mm", lamp.position_mm}});
+    return {{"driver", rig.lamps_driver}, {"lamps", list}};
+}
+
+CommandResult list(const Arguments& a) {
+    CommandResult result;
+    const auto daemon = a.rig.empty() ? running_daemon(a) : std::nullopt;
+    result.json = daemon ? Json::parse(daemon->call("GET", "lamps").dump()) : lamps_of(rig_of(a));
+    for (const Json& lamp : result.json.at("lamps")) {
+        const auto position = lamp.at("position_mm").get<std::array<double, 3>>();
+        result.text += fmt::format("{}{:<20} at {:8.1f} {:8.1f} {:8.1f} mm", result.text.empty() ? "" : "\n",
+                                   lamp.at("name").get<std::string>(), position[0], position[1], position[2]);
+    }
+    return result;
+}
+
+CommandResult all_dark(const std::string& detail) {
+    CommandResult result;
+    result.json = {{"dark", true}};
+    result.text = detail;
+    return result;
+}
+
+/// Waits until the daemon says that the lamps are dark: an accepted request is not yet darkness.
+CommandResult darken_through(const DaemonClient& client) {
+    const DaemonClient::Json accepted = client.call("POST", "lamps/dark");
+    DaemonClient::Json told;
+    client.follow_events(accepted.at("event"), {.event = [&](const DaemonClient::Json& event) {
+                             if (event.at("event") != "lamps") return DaemonClient::Follow::go_on;
+                             told = event;
+                             return DaemonClient::Follow::leave;
+                         }});
+    if (told.is_null())
+        throw DeviceError("darkboxd stopped before it told whether the lamps are dark", "look at the lamps");
+    if (!told.at("dark")) throw DeviceError(told.at("detail"), "cut the lamps' supply");
+    return all_dark(told.at("detail"));
+}
+
+CommandResult dark(const Arguments& a, const WorkContext&) {
+    if (const auto daemon = running_daemon(a)) return darken_through(*daemon);
+    Hardware hardware(rig_of(a));
+    hardware.open_lamps()->dark();
+    return all_dark("all lamps are dark");
+}
+
+LampId find_lamp(const RigDescription& rig, const std::string& name) {
+    const auto found = std::find_if(rig.lamps.begin(), rig.lamps.end(),
+                                    [&](const LampDescription& lamp) { return lamp.name == name; });
+    if (found == rig.lamps.end())
+        throw InputError(fmt::format("there is no lamp '{}'", name), "darkbox lamps list names them");
+    return LampId{static_cast<std::uint32_t>(found - rig.lamps.begin())};
+}
+
+/// Ends early when asked to stop.
+void wait(Seconds time, const WorkContext& work) {
+    constexpr auto step = std::chrono::milliseconds(20);
+    SystemClock clock;
+    const TimePoint end = clock.now() + to_nanoseconds(time);
+    while (!work.cancelled() && clock.now() < end) clock.sleep_until(std::min(end, clock.now() + step));
+}
+
+CommandResult on(const Arguments& a, const WorkContext& work) {
+    if (running_daemon(a))
+        throw InputError("darkboxd runs, and the lamps are its own", "stop it to light a lamp by hand");
+    const RigDescription rig = rig_of(a);
+    const LampId lamp = find_lamp(rig, a.lamp);
+    // The guardian takes a lamp that reaches max_on for forgotten.
+    constexpr double share_of_max_on = 0.9;
+    const Seconds most = rig.lamps[lamp.value].max_on * share_of_max_on;
+    const Seconds time = a.seconds ? Seconds(*a.seconds) : most;
+    if (time > most)
+        throw InputError(fmt::format("--seconds is {}; allowed: above 0 to {:.3g}, nine tenths of max_on_s of '{}'",
+                                     time.count(), most.count(), a.lamp),
+                         "light it for a shorter time");
+    Hardware hardware(rig);
+    const auto lamps = hardware.open_lamps();
+    const DarkOnExit dark_on_exit(*lamps);
+    lamps->light(lamp, 1.0);
+    wait(time, work);
+    lamps->dark();
+    return all_dark(fmt::format("'{}' was lit; all lamps are dark", a.lamp));
+}
+
+}  // namespace
+
+void add_lamps_commands(CommandLine& line) {
+    CLI::App& group = line.add_group("lamps", "The lamps of the rig");
+    const auto add = [&](const char* name, const char* description, const char* example, auto body) -> auto {
+        const auto a = std::make_shared<Arguments>();
+        CLI::App& command =
+            line.add(name, description, example, [a, body](const WorkContext& work) { return body(*a, work); }, &group);
+        command.add_option("--socket", a->socket, "Where darkboxd listens");
+        command.add_option("--rig", a->rig, "The rig's description, where no darkboxd runs");
+        return std::pair<CLI::App*, std::shared_ptr<Arguments>>(&command, a);
+    };
+    add("list", "Names and places of the lamps", "darkbox lamps list",
+        [](const Arguments& a, const WorkContext&) { return list(a); });
+    add("dark", "Darken every lamp; a running capture is cancelled", "darkbox lamps dark", dark);
+    const auto [command, a] =
+        add("on", "Light one lamp for a moment, without darkboxd", "darkbox lamps on low-1 --rig rig.toml", on);
+    command->add_option("name", a->lamp, "The lamp")->required();
+    command->add_option("--seconds", a->seconds, "How long; default and most: nine tenths of the lamp's max_on_s")
+        ->check(CLI::PositiveNumber);
+}
+
+}  // namespace darkbox
