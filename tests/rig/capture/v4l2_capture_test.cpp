@@ -51,6 +51,8 @@ exposure_ms = 10
 tries = 4
 [lamps]
 driver = "gpio"
+[lamps.gpio]
+chip = "c"
 [[lamps.lamp]]
 name = "left"
 line = "1"

@@ -101,9 +101,10 @@ TEST_F(BadInput, UnknownKeyInTheRigDescription) {
 }
 
 TEST_F(BadInput, ACameraThatIsNotThere) {
-    std::ofstream(path("rig.toml")) << "[rig]\nname = \"r\"\n[camera]\ndriver = \"v4l2\"\ndevice = \"usb-Absent\"\n"
-                                       "[lamps]\ndriver = \"gpio\"\n[[lamps.lamp]]\nname = \"a\"\nline = \"L1\"\n"
-                                       "position_mm = [0, 0, 900]\n";
+    std::ofstream(path("rig.toml"))
+        << "[rig]\nname = \"r\"\n[camera]\ndriver = \"v4l2\"\ndevice = \"usb-Absent\"\n"
+           "[lamps]\ndriver = \"gpio\"\n[lamps.gpio]\nchip = \"c\"\n[[lamps.lamp]]\nname = \"a\"\nline = \"L1\"\n"
+           "position_mm = [0, 0, 900]\n";
     EXPECT_EQ(darkbox_program({"rig", "check", "--rig", path("rig.toml").string()}).status, 0);
     expect_one_error(darkbox_program({"rig", "check", "--camera", "--rig", path("rig.toml").string()}),
                      "/dev/v4l/by-id/usb-Absent");

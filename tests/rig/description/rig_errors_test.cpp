@@ -38,7 +38,8 @@ position_mm = [0, 500, 700]
 /// A real camera's rig with `lines` in its [camera].
 std::string real(const std::string& lines) {
     return "[rig]\nname = \"r\"\n[camera]\ndriver = \"v4l2\"\ndevice = \"cam\"\n" + lines +
-           "\n[lamps]\ndriver = \"gpio\"\n[[lamps.lamp]]\nname = \"a\"\nline = \"L1\"\nposition_mm = [0, 0, 900]\n";
+           "\n[lamps]\ndriver = \"gpio\"\n[lamps.gpio]\nchip = \"c\"\n[[lamps.lamp]]\nname = \"a\"\nline = "
+           "\"L1\"\nposition_mm = [0, 0, 900]\n";
 }
 
 /// The good rig with one piece of its text replaced.
