@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
@@ -176,7 +177,8 @@ TransferResult transferred(const TransferSource& source, const NormalMap& target
     result.coherence = coherence(result.coordinates);
     const Appearance shown = appearance_of({from.normal, from.valid}, exemplar, white);
     const Appearance moved = appearance_of(target, result.albedo, white);
-    constexpr int sparse = 16;  // so that it costs little next to the synthesis
+    // About a thousand patches, so that it costs little next to the synthesis at any size.
+    const int sparse = std::max(16, std::max(target.valid.cols, target.valid.rows) / 32);
     result.patch_energy = patch_energy(colour_patches(shown, options.window), colour_patches(moved, options.window),
                                        options.window, sparse)
                               .value_or(0);

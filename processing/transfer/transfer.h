@@ -23,7 +23,7 @@ struct TransferOptions {
         0;  ///< pyramid levels; 0 = as many as keep the shorter side at 32 pixels or more, for patchmatch at most 3
     double kappa = 0.0;           ///< Hertzmann's coherence weight, 0...25; around 2 keeps stones and bricks whole
     double normal_weight = 1.0;   ///< weight of normals against albedo in the feature, 0...100
-    double normal_sigma = 2.0;    ///< low-pass of the normals, pixels, 0...64
+    double normal_sigma = 1.0;    ///< low-pass of the normals, pixels, 0...64
     double jitter = 1.0;          ///< patchmatch, preview: 0...1, how freely chunks are picked among those that fit
     double control_weight = 1.0;  ///< patchmatch: weight of the control map against albedo, 0...100
     /// Refinement of each level, 0...64; 0 = Image Analogies as the thesis has them, or patchmatch's bare seeds. None:
