@@ -192,7 +192,7 @@ void add_transfer_command(CommandLine& line) {
     command.add_option("--target-mask", a->target_mask, "White on the target, for a plain normal map");
     command.add_option("--out", a->out, "Folder for albedo, index, coordinates, normals and relit-*.png")->required();
     command.add_option("--method", a->options.method, "analogies, patchmatch or preview (default: patchmatch)")
-        ->transform(CLI::CheckedTransformer(methods));
+        ->transform(CLI::CheckedTransformer(methods).description("{analogies,patchmatch,preview}"));
     command.add_option("--apply", a->apply, "Other maps of the source, carried over in their own format")
         ->expected(1, -1);
     command.add_option("--control-source", a->source_control, "patchmatch: a drawn guide, 8- or 16-bit PNG or EXR");

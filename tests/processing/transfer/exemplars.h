@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <opencv2/core.hpp>
 
+#include "processing/maps/lights.h"
 #include "processing/texels/random.h"
 #include "processing/transfer/transfer.h"
 #include "tests/support/textured_sphere.h"
@@ -79,6 +80,20 @@ inline TransferResult transferred_on(int threads, const TransferSource& source, 
     WorkContext work;
     work.threads = threads;
     return transfer_texture(source, target, options, work);
+}
+
+/// Mean over the target of the angle from its normal to that of the source pixel assigned to it.
+inline double mean_guide_error_deg(const NormalMap& source, const NormalMap& target, const cv::Mat2i& coordinates) {
+    const auto as_eigen = [](const cv::Vec3f& n) { return Eigen::Vector3d(n[0], n[1], n[2]); };
+    double sum = 0;
+    int count = 0;
+    for (int y = 0; y < target.valid.rows; ++y)
+        for (int x = 0; x < target.valid.cols; ++x)
+            if (target.valid(y, x)) {
+                sum += angle_deg(as_eigen(target.normal(y, x)), as_eigen(source.normal(cv::Point(coordinates(y, x)))));
+                ++count;
+            }
+    return sum / count;
 }
 
 }  // namespace darkbox::test

@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "acquisition/frame/error.h"
-#include "processing/maps/lights.h"
 #include "tests/processing/transfer/exemplars.h"
 
 namespace darkbox {
@@ -13,6 +12,7 @@ namespace {
 
 using test::by;
 using test::equal;
+using test::mean_guide_error_deg;
 using test::plane_normals;
 using test::sphere_normals;
 using test::stony;
@@ -20,19 +20,6 @@ using test::stony_sphere;
 using test::transferred_on;
 using test::wavy_normals;
 using testing::HasSubstr;
-
-double mean_guide_error_deg(const NormalMap& source, const NormalMap& target, const cv::Mat2i& coordinates) {
-    const auto as_eigen = [](const cv::Vec3f& n) { return Eigen::Vector3d(n[0], n[1], n[2]); };
-    double sum = 0;
-    int count = 0;
-    for (int y = 0; y < target.valid.rows; ++y)
-        for (int x = 0; x < target.valid.cols; ++x)
-            if (target.valid(y, x)) {
-                sum += angle_deg(as_eigen(target.normal(y, x)), as_eigen(source.normal(cv::Point(coordinates(y, x)))));
-                ++count;
-            }
-    return sum / count;
-}
 
 /// The share of valid source pixels that are used.
 double cover(const TransferSource& source, const cv::Mat2i& coordinates) {

@@ -4,7 +4,6 @@
 
 #include <cmath>
 
-#include "processing/maps/lights.h"
 #include "processing/transfer/pyramid.h"
 #include "tests/processing/transfer/exemplars.h"
 
@@ -13,26 +12,13 @@ namespace {
 
 using test::by;
 using test::equal;
+using test::mean_guide_error_deg;
 using test::plane_normals;
 using test::sphere_normals;
 using test::stony;
 using test::stony_sphere;
 using test::transferred_on;
 using test::wavy_normals;
-
-/// Mean over the target of the angle from its normal to that of the source pixel assigned to it.
-double mean_guide_error_deg(const NormalMap& source, const NormalMap& target, const cv::Mat2i& coordinates) {
-    const auto as_eigen = [](const cv::Vec3f& n) { return Eigen::Vector3d(n[0], n[1], n[2]); };
-    double sum = 0;
-    int count = 0;
-    for (int y = 0; y < target.valid.rows; ++y)
-        for (int x = 0; x < target.valid.cols; ++x)
-            if (target.valid(y, x)) {
-                sum += angle_deg(as_eigen(target.normal(y, x)), as_eigen(source.normal(cv::Point(coordinates(y, x)))));
-                ++count;
-            }
-    return sum / count;
-}
 
 TEST(Transfer, OntoItselfGivesItself) {
     const TransferSource source = stony_sphere(64);
