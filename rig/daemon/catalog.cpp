@@ -143,8 +143,7 @@ void compare_again(SQLite::Database& database, const fs::path& folder, const Ear
             database, "SELECT * FROM calibrations WHERE rig = ? ORDER BY created, session", read_calibration_row, rig);
         for (std::size_t i = 0; i < all.size(); ++i) {
             if (all[i].created < created) continue;
-            rows_of<int>(
-                database, "DELETE FROM drift WHERE session = ?", [](Statement&) { return 0; }, all[i].session);
+            rows_of<int>(database, "DELETE FROM drift WHERE session = ?", [](Statement&) { return 0; }, all[i].session);
             if (i == 0) continue;
             put_drift(database, compare_calibrations(folder, all[i - 1].session, all[i].session, "last"));
             put_drift(database, compare_calibrations(folder, all[0].session, all[i].session, "first"));
@@ -197,7 +196,9 @@ private:
     int changes_ = 0;
 };
 
-void refresh_all(SQLite::Database& database, const fs::path& folder) {
+/// Returns the sessions that are not settled.
+std::map<std::string, std::string> refresh_all(SQLite::Database& database, const fs::path& folder) {
+    std::map<std::string, std::string> unsettled;
     auto known = known_stamps(database);
     Batches batches(database);
     Earliest changed;
@@ -210,6 +211,7 @@ void refresh_all(SQLite::Database& database, const fs::path& folder) {
     };
     for (const std::string& session : session_names(folder)) {
         const std::string stamp = session_stamp(folder / session);
+        if (stamp.empty() || stamp.starts_with('-')) unsettled.emplace(session, stamp);
         const auto old = known.find(session);
         const bool same = old != known.end() && old->second == stamp;
         if (old != known.end() && !stamp.empty()) known.erase(old);
@@ -220,6 +222,7 @@ void refresh_all(SQLite::Database& database, const fs::path& folder) {
     for (const auto& gone : known) batches.apply([&] { replace(gone.first, std::nullopt, ""); });
     batches.apply([&] { compare_again(database, folder, changed); });
     batches.commit();
+    return unsettled;
 }
 
 std::unique_ptr<Catalog::State> open_state(const fs::path& folder, Catalog::Place place) {
@@ -246,7 +249,7 @@ bool Catalog::was_damaged() const { return state_->was_damaged; }
 void Catalog::refresh() {
     with_database(*state_, [&](SQLite::Database& database) {
         const std::string stamp = folder_stamp(folder_);
-        refresh_all(database, folder_);
+        state_->unsettled = refresh_all(database, folder_);
         state_->folder_stamp = stamp;
     });
 }
@@ -258,8 +261,16 @@ void Catalog::refresh(const std::string& session) {
 
 void Catalog::refresh_if_changed() {
     const std::string stamp = folder_stamp(folder_);
-    const bool changed =
-        with_database(*state_, [&](SQLite::Database&) { return stamp != state_->folder_stamp; });
+    const bool changed = with_database(*state_, [&](SQLite::Database& database) {
+        if (stamp != state_->folder_stamp) return true;
+        for (auto& [session, old] : state_->unsettled) {
+            std::string now = session_stamp(folder_ / session);
+            if (now == old) continue;
+            read_again(database, folder_, session);
+            old = std::move(now);
+        }
+        return false;
+    });
     if (changed) refresh();
 }
 
@@ -267,7 +278,7 @@ void Catalog::rebuild() {
     with_database(*state_, [&](SQLite::Database& database) {
         database.exec("DELETE FROM sessions");
         database.exec("PRAGMA wal_checkpoint(TRUNCATE)");
-        refresh_all(database, folder_);
+        state_->unsettled = refresh_all(database, folder_);
     });
 }
 

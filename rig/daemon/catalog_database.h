@@ -3,6 +3,8 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 
 #include <filesystem>
+#include <map>
+#include <memory>
 #include <mutex>
 #include <string>
 
@@ -17,6 +19,8 @@ struct Catalog::State {
     std::unique_ptr<SQLite::Database> database;
     bool was_damaged = false;
     std::string folder_stamp = {};  ///< of the folder at the last refresh()
+    /// Folders that may become or finish a session without the folder above them changing, with their stamps.
+    std::map<std::string, std::string> unsettled = {};
 };
 
 /// The version of the tables that this program writes; PRAGMA user_version in the file.
