@@ -177,21 +177,21 @@ Controller::Reply Controller::run_program(const uint8_t* payload, uint32_t now_u
     if (command.count < 1 || command.count > most_steps)
         return {Outcome::out_of_range, offsetof(RunProgramCommand, count), 0};
     if (command.rounds < 1) return {Outcome::out_of_range, offsetof(RunProgramCommand, rounds), 0};
+    dark();  // what follows takes long, and nothing may be lit while the ticks wait
     if (program_.crc(command.count) != command.crc) return {Outcome::other_program, 0, 0};
     for (uint8_t place = 0; place < command.count; ++place) {
         const Reply reply = check_step(place);
         if (reply.outcome != Outcome::done) return reply;
     }
-    program_.start(command.count, command.rounds, now_us);
-    show_step(now_us);
+    program_.start(command.count, command.rounds, now_us + program_starts_after_us);
     return {Outcome::done, 0, 0};
 }
 
 void Controller::show(const LampSet& lamps, uint8_t level) {
+    outputs_.show(lamps, level);  // first: what follows takes longer for some lamps than for others
     budgets_.switched(lit_, lamps);
     lit_ = lamps;
     level_ = level;
-    outputs_.show(lamps, level);
 }
 
 void Controller::show_step(uint32_t now_us) {
@@ -214,10 +214,14 @@ void Controller::dark() {
 
 void Controller::advance(uint32_t now_us) {
     while (program_.due(now_us)) {
-        if (program_.phase() == Program::Phase::exposure)
+        if (program_.phase() == Program::Phase::starting) {
+            program_.begin();
+            show_step(now_us);
+        } else if (program_.phase() == Program::Phase::exposure) {
             end_step(now_us);
-        else if (program_.end_lead() && (program_.current().lamp_and_mode & step_trigger) != 0)
+        } else if (program_.end_lead() && (program_.current().lamp_and_mode & step_trigger) != 0) {
             outputs_.trigger(true);
+        }
     }
 }
 

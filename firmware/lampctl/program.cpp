@@ -12,12 +12,13 @@ constexpr uint32_t hopelessly_late_us = 1000;
 
 }  // namespace
 
-void Program::start(uint8_t count, uint16_t rounds, uint32_t now_us) {
+void Program::start(uint8_t count, uint16_t rounds, uint32_t at_us) {
     count_ = count;
     rounds_ = rounds;
     place_ = 0;
     round_ = 0;
-    begin_step(now_us);
+    phase_ = Phase::starting;
+    deadline_us_ = at_us;
 }
 
 void Program::begin_step(uint32_t at_us) {

@@ -13,7 +13,7 @@ namespace lampctl {
 /// not add up.
 class Program {
 public:
-    enum class Phase : uint8_t { idle, lead, strobe, exposure };
+    enum class Phase : uint8_t { idle, starting, lead, strobe, exposure };
 
     struct Finished {
         uint8_t step;
@@ -26,7 +26,10 @@ public:
     uint16_t crc(uint8_t count) const { return lamp_protocol::crc16(steps_, count * sizeof(lamp_protocol::Step)); }
     const lamp_protocol::Step& step(uint8_t place) const { return steps_[place]; }
 
-    void start(uint8_t count, uint16_t rounds, uint32_t now_us);
+    /// begin() is due at that moment.
+    void start(uint8_t count, uint16_t rounds, uint32_t at_us);
+    /// The first step begins.
+    void begin() { begin_step(deadline_us_); }
     void stop() { phase_ = Phase::idle; }
     bool running() const { return phase_ != Phase::idle; }
     Phase phase() const { return phase_; }
@@ -35,7 +38,7 @@ public:
 
     /// When something is due; meaningless while idle, and while the strobe is waited for.
     uint32_t deadline_us() const { return deadline_us_; }
-    bool has_deadline() const { return phase_ == Phase::lead || phase_ == Phase::exposure; }
+    bool has_deadline() const { return phase_ != Phase::idle && phase_ != Phase::strobe; }
     bool due(uint32_t now_us) const { return has_deadline() && static_cast<int32_t>(now_us - deadline_us_) >= 0; }
 
     /// The lead is over: the exposure begins, or the strobe is waited for. Returns whether it begins.

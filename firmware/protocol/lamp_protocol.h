@@ -181,6 +181,8 @@ struct WriteStepsCommand {
 static_assert(sizeof(WriteStepsCommand) == 60, "");
 static_assert(sizeof(CommandHeader) + sizeof(WriteStepsCommand) == largest_packet, "");
 
+/// Dark at once; the first step begins this much later, so that its time does not depend on how long the checks took.
+constexpr uint32_t program_starts_after_us = 5000;
 struct RunProgramCommand {
     uint8_t count;  ///< steps, from the first
     uint8_t reserved;

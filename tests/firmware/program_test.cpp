@@ -32,9 +32,12 @@ protected:
     }
     Outcome run(const std::vector<Step>& steps, std::uint16_t rounds = 1) {
         test::write_program(board, steps);
+        const Outcome got = outcome(board.command(Command::run_program, test::run_command(steps, rounds)));
         switches.clear();
+        if (got == Outcome::done) board.run_us(program_starts_after_us);
         begin = board.now_us();
-        return outcome(board.command(Command::run_program, test::run_command(steps, rounds)));
+        for (Switch& first : switches) first.at_us = 0;
+        return got;
     }
     std::vector<Event> steps_done() {
         board.fetch_events();
@@ -126,7 +129,7 @@ TEST_F(LampProgram, HalfAProgramNeverRuns) {
     const std::vector<Step> steps{step(1, 0, 1000), step(2, 0, 1000)};
     test::write_program(board, {steps[0]});
     EXPECT_EQ(outcome(board.command(Command::run_program, test::run_command(steps))), Outcome::other_program);
-    EXPECT_TRUE(switches.empty());
+    EXPECT_TRUE(board.lit().empty());
 }
 
 TEST_F(LampProgram, StepsBeyondTheRangesAreRefused) {
