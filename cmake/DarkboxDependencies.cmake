@@ -8,6 +8,8 @@ if(CMAKE_CXX_FLAGS MATCHES "-fsanitize=address")
   # Under this sanitizer Eigen takes malloc's memory otherwise than the Ceres library does that was built without it, and
   # one would free what the other took. The sanitizer's malloc is aligned as well.
   add_compile_definitions(EIGEN_MALLOC_ALREADY_ALIGNED=1)
+  # GCC 12 then also warns of values "never set" inside the standard library's own optional and regex.
+  add_compile_options(-Wno-maybe-uninitialized)
 endif()
 find_package(TBB REQUIRED)
 find_package(TIFF REQUIRED)
