@@ -192,8 +192,11 @@ Job JobBook::finish(Job job) {
     try {
         keep(job);
         prune();
+        for (const auto& entry : unsaved_) store_.save(entry.second);
+        unsaved_.clear();
     } catch (const Error& error) {
-        // After a restart it counts as cut off and is looked at again.
+        // Unless the disk takes it later, it counts as cut off after a restart: a capture is found sealed, processing
+        // is done again.
         unsaved_[job.id] = job;
         log_.publish("problem", {{"job", job.id}, {"detail", error.what()}, {"hint", error.hint()}});
     }
