@@ -9,7 +9,7 @@ namespace darkbox::sim {
 
 /// A break in the wiring between lines and lamps.
 struct WiringFault {
-    std::vector<std::size_t> cut;                             ///< lamps that never burn
+    std::vector<std::size_t> cut;                              ///< lamps that never burn
     std::vector<std::pair<std::size_t, std::size_t>> swapped;  ///< pairs whose wires are exchanged
 };
 

@@ -65,11 +65,13 @@ void run(const Arguments& a) {
 
 int parse_and_run(int argc, char** argv) {
     Arguments a;
-    CLI::App app("The digital twin as a USB camera that the kernel's own driver drives, lit by the lines of a gpio-sim chip",
-                 "twin_camera");
+    CLI::App app(
+        "The digital twin as a USB camera that the kernel's own driver drives, lit by the lines of a gpio-sim chip",
+        "twin_camera");
     app.require_subcommand(1);
     CLI::App& rendering = *app.add_subcommand("render", "Render what the camera will see, ahead");
-    CLI::App& running = *app.add_subcommand("run", "Plug the camera in. SIGUSR1: the next frame is damaged; SIGUSR2: unplug, and plug in again");
+    CLI::App& running = *app.add_subcommand(
+        "run", "Plug the camera in. SIGUSR1: the next frame is damaged; SIGUSR2: unplug, and plug in again");
     for (CLI::App* command : {&rendering, &running}) {
         command->add_option("--rig", a.rig, "The rig's description; [sim] names the scene")->required();
         command->add_option("--pictures", a.pictures, "File of what was rendered")->required();

@@ -84,8 +84,8 @@ bool TwinCamera::send_frame(UsbIpPort& port, const std::vector<std::uint16_t>& s
     constexpr std::size_t header_size = 2;
     for (std::size_t sent = 0; sent < bytes.size();) {
         const std::size_t part = std::min(bytes.size() - sent, UvcCamera::largest_payload - header_size);
-        const auto header = UvcCamera::bytes(
-            {.odd_frame = frames_ % 2 == 1, .last = sent + part == bytes.size(), .error = damaged});
+        const auto header =
+            UvcCamera::bytes({.odd_frame = frames_ % 2 == 1, .last = sent + part == bytes.size(), .error = damaged});
         UsbBytes payload(header.begin(), header.end());
         const auto first = bytes.begin() + static_cast<std::ptrdiff_t>(sent);
         payload.insert(payload.end(), first, first + static_cast<std::ptrdiff_t>(part));

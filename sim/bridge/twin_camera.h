@@ -26,8 +26,8 @@ struct TwinOptions {
     Seconds unplugged{3.0};  ///< how long it stays away
 };
 
-/// The digital twin behind the kernel's own camera driver: a free-running global-shutter USB camera that sees the scene in
-/// the light of the lamps whose lines were high during each exposure. Thread-compatible.
+/// The digital twin behind the kernel's own camera driver: a free-running global-shutter USB camera that sees the scene
+/// in the light of the lamps whose lines were high during each exposure. Thread-compatible.
 class TwinCamera {
 public:
     TwinCamera(const TwinPictures& pictures, const LampLines& lamps, Clock& clock, const TwinOptions& options,

@@ -68,8 +68,7 @@ void TwinPictures::write(const std::filesystem::path& file) const {
     for (const std::vector<float>& samples : radiance_)
         out.write(reinterpret_cast<const char*>(samples.data()), bytes_of(samples));
     out.flush();
-    if (!out)
-        throw DeviceError(fmt::format("cannot write {}", file.string()), "check the folder and the free space");
+    if (!out) throw DeviceError(fmt::format("cannot write {}", file.string()), "check the folder and the free space");
 }
 
 std::vector<std::uint16_t> TwinPictures::expose(const Sensor& sensor, const std::vector<double>& shares,

@@ -32,8 +32,8 @@ class UsbFunction {
 public:
     virtual ~UsbFunction() = default;
     virtual const UsbDescriptors& descriptors() const = 0;
-    /// A request of a class or a vendor. `data` is what the host sent; the answer goes to the host where the request asks
-    /// for one. No value: the request is stalled.
+    /// A request of a class or a vendor. `data` is what the host sent; the answer goes to the host where the request
+    /// asks for one. No value: the request is stalled.
     virtual std::optional<UsbBytes> control(const UsbRequest& request, std::span<const std::uint8_t> data) = 0;
 };
 

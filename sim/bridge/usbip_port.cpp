@@ -134,11 +134,9 @@ void UsbIpPort::unlink(const Header& header) {
 
 void UsbIpPort::control(const Header& header, std::span<const std::uint8_t> data) {
     const UsbRequest request = parse(header.setup);
-    const auto answer =
-        (request.type & type_mask) == 0 ? standard_request(request) : function_.control(request, data);
+    const auto answer = (request.type & type_mask) == 0 ? standard_request(request) : function_.control(request, data);
     if (!answer) return reply(header.sequence, -EPIPE, 0, {});
-    if ((request.type & to_host) == 0)
-        return reply(header.sequence, 0, static_cast<std::uint32_t>(data.size()), {});
+    if ((request.type & to_host) == 0) return reply(header.sequence, 0, static_cast<std::uint32_t>(data.size()), {});
     const std::size_t most = std::min<std::size_t>(request.length, header.word[1]);
     const auto sent = std::span(*answer).first(std::min(answer->size(), most));
     reply(header.sequence, 0, static_cast<std::uint32_t>(sent.size()), sent);

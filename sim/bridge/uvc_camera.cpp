@@ -63,8 +63,12 @@ UsbBytes control_descriptors() {
                  units});
 }
 
-std::uint32_t frame_bytes(const UvcCamera::Mode& mode) { return static_cast<std::uint32_t>(mode.width * mode.height * 2); }
-std::uint32_t interval(const UvcCamera::Mode& mode) { return static_cast<std::uint32_t>(std::lround(mode.period.count() * 1e7)); }
+std::uint32_t frame_bytes(const UvcCamera::Mode& mode) {
+    return static_cast<std::uint32_t>(mode.width * mode.height * 2);
+}
+std::uint32_t interval(const UvcCamera::Mode& mode) {
+    return static_cast<std::uint32_t>(std::lround(mode.period.count() * 1e7));
+}
 
 UsbBytes streaming_descriptors(const UvcCamera::Mode& mode) {
     const UsbBytes y16{'Y', '1', '6', ' ', 0, 0, 0x10, 0, 0x80, 0, 0, 0xaa, 0, 0x38, 0x9b, 0x71};
@@ -92,7 +96,8 @@ UsbDescriptors describe(const UvcCamera::Mode& mode, const std::string& serial) 
     UsbDescriptors result;
     result.strings = {"darkbox", "Digital twin", serial};
     // Vendor 0x1209: pid.codes; product 1 is for tests.
-    result.device = sized(join({{1}, number(0x0200, 2), {0xef, 2, 1, 64}, number(0x1209, 2), number(1, 2), number(0x0100, 2), {1, 2, 3, 1}}));
+    result.device = sized(join(
+        {{1}, number(0x0200, 2), {0xef, 2, 1, 64}, number(0x1209, 2), number(1, 2), number(0x0100, 2), {1, 2, 3, 1}}));
     const UsbBytes content = join({
         sized({11, control_interface, 2, video_class, interface_collection, 0, 0}),
         interface(control_interface, 0, video_control),
@@ -102,8 +107,9 @@ UsbDescriptors describe(const UvcCamera::Mode& mode, const std::string& serial) 
         sized(join({{5, 0x80 | UvcCamera::stream_endpoint, 2}, number(512, 2), {0}})),
     });
     constexpr std::uint32_t header_size = 9;
-    result.configuration =
-        join({sized(join({{2}, number(static_cast<std::uint32_t>(header_size + content.size()), 2), {2, 1, 0, 0x80, 50}})), content});
+    result.configuration = join(
+        {sized(join({{2}, number(static_cast<std::uint32_t>(header_size + content.size()), 2), {2, 1, 0, 0x80, 50}})),
+         content});
     return result;
 }
 
@@ -118,7 +124,8 @@ std::int32_t value_of(std::span<const std::uint8_t> data) {
 UvcCamera::UvcCamera(const Mode& mode, const std::string& serial)
     : mode_(mode),
       descriptors_(describe(mode, serial)),
-      controls_{Control{camera_terminal, ae_mode, 1, 1, 8, manual_mode | aperture_priority, aperture_priority, aperture_priority},
+      controls_{Control{camera_terminal, ae_mode, 1, 1, 8, manual_mode | aperture_priority, aperture_priority,
+                        aperture_priority},
                 Control{camera_terminal, exposure_absolute, 4, 1, 10'000, 1, 156, 156},
                 Control{processing_unit, gain_selector, 2, lowest_gain, 160, 1, 40, 40}} {}
 

@@ -8,8 +8,8 @@
 
 namespace darkbox::sim {
 
-/// The USB side of a camera of the USB video class 1.1 ("UVC"): one picture format, Y16 in one size and rate, streamed by
-/// bulk transfers, with exposure mode, exposure time and gain as controls. It powers on in automatic exposure, as
+/// The USB side of a camera of the USB video class 1.1 ("UVC"): one picture format, Y16 in one size and rate, streamed
+/// by bulk transfers, with exposure mode, exposure time and gain as controls. It powers on in automatic exposure, as
 /// cameras do. Thread-compatible.
 class UvcCamera final : public UsbFunction {
 public:
@@ -41,9 +41,9 @@ public:
 
 private:
     struct Control {
-        std::uint8_t entity;    ///< terminal or unit
+        std::uint8_t entity;  ///< terminal or unit
         std::uint8_t selector;
-        std::uint8_t size;      ///< bytes
+        std::uint8_t size;  ///< bytes
         std::int32_t least, most, step, at_power_on;
         std::int32_t value;
     };
