@@ -23,6 +23,8 @@ void validate(const SimDescription& sim) {
     require(sim.queue_depth >= 1, "queue_depth", sim.queue_depth, "1 or more");
 }
 
+}  // namespace
+
 Sensor sensor_of(const SimDescription& sim) {
     Sensor sensor;
     sensor.bit_depth = sim.bit_depth;
@@ -32,8 +34,6 @@ Sensor sensor_of(const SimDescription& sim) {
     sensor.seed = sim.seed;
     return sensor;
 }
-
-}  // namespace
 
 SimRig SimRig::make(const RigDescription& rig, const FaultPlan& faults) {
     validate(rig.sim);

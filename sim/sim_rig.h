@@ -12,6 +12,9 @@
 
 namespace darkbox::sim {
 
+/// The sensor of a description.
+Sensor sensor_of(const SimDescription& sim);
+
 /// The whole simulated rig: what a command or the daemon uses in place of devices. Move-only; the parts refer to each
 /// other and stay where they are. Thread-compatible; the clock is thread-safe.
 class SimRig {

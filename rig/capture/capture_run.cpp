@@ -195,7 +195,7 @@ private:
     }
 
     std::string take_once(const Shot& shot) {
-        source_.recover();
+        source_.recover(to_nanoseconds(rig_.capture.frame_deadline));
         exposed_ = expose(shot);
         const std::string found = shot.lamp
                                       ? check_.accept_lit(lamp(shot).name, exposed_.frames.at(0), exposed_.frames.at(1))

@@ -64,11 +64,12 @@ FrameSource::~FrameSource() {
     }
 }
 
-void FrameSource::recover() {
+void FrameSource::recover(Nanoseconds patience) {
     if (!failed_) return;
     camera_.stop();
     last_ = {};
     camera_.start();
+    next(clock_.now() + patience);
     failed_ = false;
 }
 

@@ -22,8 +22,9 @@ public:
 
     const CameraInfo& info() const { return info_; }
 
-    /// Brings a camera that failed back to streaming: it is stopped and started once.
-    void recover();
+    /// Brings a camera that failed back to streaming: it is stopped and started once, and its first frame is awaited,
+    /// so that one that was unplugged is waited for here, while the lamps are dark.
+    void recover(Nanoseconds patience);
 
     /// The first frame whose exposure begins at `earliest` or later; older ones, which a queue held back, are passed
     /// over. Throws DeviceError for a damaged, misfitting or repeated frame, DeadlineError, Cancelled.
