@@ -204,6 +204,8 @@ void add_transfer_command(CommandLine& line) {
     command.add_option("--window", a->options.window, "Side of the window, pixels, odd")->capture_default_str();
     command.add_option("--coarse-window", a->options.coarse_window, "analogies: side of the window one level up, odd")
         ->capture_default_str();
+    command.add_flag("--exact-search", a->options.exact_search,
+                     "analogies: compare with every pixel of the source, for tests: slow");
     command.add_option("--kappa", a->options.kappa, "Coherence weight: what continues a neighbour's patch wins")
         ->capture_default_str();
     command.add_option("--normal-weight", a->options.normal_weight, "Weight of normals against albedo")
