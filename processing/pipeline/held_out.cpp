@@ -141,7 +141,7 @@ RelightScene scene_of(const PhotoStack& stack, const Lights& lights, const Photo
     ShadingOptions options;
     options.geometry = geometry;
     ShadingResult shaded = shading_maps(stack, lights, solved.normals, solved.albedo, index, options, work);
-    return {solved.normals, std::move(shaded.albedo), std::move(index), std::move(shaded.maps)};
+    return {solved.normals, std::move(shaded.albedo), std::move(index), std::move(shaded.maps), geometry};
 }
 
 /// Coordinates in the plane across `axis`; no value for a direction that does not meet it.

@@ -132,6 +132,9 @@ ProcessSummary run_process(const Session& session, const ProcessOptions& options
 RelightScene load_scene(const Session& session);
 /// What relight needs: the same, but its albedo is that under the shading maps (ShadingResult::albedo).
 RelightScene load_shaded_scene(const Session& session);
+/// Where the object's surface lies, for near lamps: the scene's `geometry`. Throws InputError where the session does
+/// not know the scale of its pictures.
+SceneGeometry load_geometry(const Session& session);
 /// What calibration/lights.json holds.
 Calibration load_calibration(const Session& session);
 /// Its lights.

@@ -29,6 +29,9 @@ struct TransferOptions {
     /// Refinement of each level, 0...64; 0 = Image Analogies as the thesis has them, or patchmatch's bare seeds. None:
     /// 7 for patchmatch, 16 for analogies.
     std::optional<int> passes;
+    /// analogies: the global match reads every feature of the source in full instead of a short list by principal
+    /// components. For testing: time grows with source times target, half an hour of a core at 512 x 512.
+    bool exact_search = false;
     std::uint64_t seed = 1;  ///< of all random choices
 
     /// Throws InputError that names the field and the allowed range.
@@ -66,7 +69,7 @@ struct TransferResult {
 /// Texture replacement: source coordinates are synthesised such that normals and texture fit; albedo, index and fine
 /// relief are read through them. Only valid source pixels are ever used. Bit-identical on any number of threads.
 /// Throws InputError for an empty source or target, for maps that do not fit together or are not finite, and for
-/// control maps with another method than patchmatch; Cancelled.
+/// control maps with another method than patchmatch or an exact search with another than analogies; Cancelled.
 TransferResult transfer_texture(const TransferSource& source, const NormalMap& target,
                                 const TransferOptions& options = {}, const WorkContext& work = {},
                                 const ControlMaps& control = {});

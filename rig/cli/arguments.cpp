@@ -17,6 +17,21 @@ constexpr double shortest_direction = 1e-6;
     throw InputError(fmt::format("{} '{}' is not {}", option, text, form), "see --help for an example");
 }
 
+/// "X,Y,Z" or "X,Y,Z:R,G,B": the first three as `direction`, whatever they mean.
+Light light_of(const std::string& option, const std::string& text) {
+    const auto at = text.find(':');
+    const auto d = parse_numbers(option, text.substr(0, at), 3);
+    Light light;
+    light.file = text;
+    light.direction = {d[0], d[1], d[2]};
+    if (at == std::string::npos) return light;
+    const auto i = parse_numbers(option, text.substr(at + 1), 3);
+    light.intensity = {i[0], i[1], i[2]};
+    if ((light.intensity.array() < 0).any())
+        throw InputError(fmt::format("{} '{}' has a negative intensity", option, text), "intensities are 0 or more");
+    return light;
+}
+
 }  // namespace
 
 std::vector<double> parse_numbers(const std::string& option, const std::string& text, std::size_t count) {
@@ -60,21 +75,22 @@ std::pair<std::string, cv::Point2d> parse_highlight(const std::string& text) {
 }
 
 Light parse_light(const std::string& text) {
-    const auto at = text.find(':');
-    const auto d = parse_numbers("--light", text.substr(0, at), 3);
-    Light light;
-    light.file = text;
-    light.direction = {d[0], d[1], d[2]};
+    Light light = light_of("--light", text);
     if (light.direction.norm() < shortest_direction)
         throw InputError(fmt::format("--light '{}' has no direction", text),
                          "give a vector from the object to the light");
     light.direction.normalize();
-    if (at != std::string::npos) {
-        const auto i = parse_numbers("--light", text.substr(at + 1), 3);
-        light.intensity = {i[0], i[1], i[2]};
-        if ((light.intensity.array() < 0).any())
-            throw InputError(fmt::format("--light '{}' has a negative intensity", text), "intensities are 0 or more");
-    }
+    return light;
+}
+
+Light parse_lamp_position(const std::string& text, const Eigen::Vector3d& object_mm) {
+    Light light = light_of("--light-position", text);
+    light.near = LampPosition{light.direction, object_mm};
+    light.direction -= object_mm;
+    if (light.direction.norm() < shortest_direction)
+        throw InputError(fmt::format("--light-position '{}' is in the object itself", text),
+                         "give a place off the object, in millimetres: x to the right, y up, z to the camera");
+    light.direction.normalize();
     return light;
 }
 

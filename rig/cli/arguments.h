@@ -31,6 +31,10 @@ std::pair<std::string, cv::Point2d> parse_highlight(const std::string& text);
 /// "X,Y,Z" of any length but zero, or "X,Y,Z:R,G,B" with an intensity per channel; the direction is made unit length.
 Light parse_light(const std::string& text);
 
+/// "X,Y,Z" in millimetres of the viewer frame, or "X,Y,Z:R,G,B" with the intensity per channel as it arrives at
+/// `object_mm`.
+Light parse_lamp_position(const std::string& text, const Eigen::Vector3d& object_mm);
+
 /// Throws InputError when this output lies in the payload of a session: that is never edited.
 void require_outside_payload(const std::filesystem::path& out);
 

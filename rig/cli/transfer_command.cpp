@@ -71,9 +71,25 @@ Source load_source(const Arguments& a) {
     return {std::move(maps), std::nullopt};
 }
 
-NormalMap load_target(const Arguments& a) {
-    if (fs::is_directory(a.target)) return load_scene(Session::open(a.target)).normals;
-    return a.target_mask.empty() ? read_normal_map(a.target) : read_normal_map(a.target, read_mask(a.target_mask));
+/// The target's normals, and where its surface lies where near lamps are to light it.
+struct Target {
+    NormalMap normals;
+    SceneGeometry geometry = {};
+};
+
+Target load_target(const Arguments& a) {
+    const bool near = !a.relight.lamp_positions.empty();
+    if (fs::is_directory(a.target)) {
+        const Session session = Session::open(a.target);
+        Target target{load_scene(session).normals};
+        if (near) target.geometry = load_geometry(session);
+        return target;
+    }
+    if (near)
+        throw InputError("a plain map as target does not say where its pixels lie, which --light-position needs",
+                         "use a processed session as --target, or --light");
+    return a.target_mask.empty() ? Target{read_normal_map(a.target)}
+                                 : Target{read_normal_map(a.target, read_mask(a.target_mask))};
 }
 
 ControlMaps load_control(const Arguments& a) {
@@ -117,28 +133,29 @@ std::vector<fs::path> write_relit_pictures(const Arguments& a, const RelightScen
         written.push_back(a.out / fmt::format("relit-{}.png", written.size() + 1));
         render_to_file(relighter, lighting, options, style, written.back(), work);
     };
-    for (const std::string& light : a.relight.lights) write(Lights{parse_light(light)});
+    for (const Light& light : lights_of(a.relight, scene)) write(Lights{light});
     for (const std::string& file : a.relight.environments) write(relighter.fold(read_environment(file), options, work));
     return written;
 }
 
 CommandResult run(const Arguments& a, const WorkContext& work) {
-    const bool relit_wanted = !a.relight.lights.empty() || !a.relight.environments.empty();
+    const bool relit_wanted =
+        !a.relight.lights.empty() || !a.relight.lamp_positions.empty() || !a.relight.environments.empty();
     require_outside_payload(a.out);
     if (!a.source.empty() && !a.source_mask.empty())
         throw InputError("--source-mask goes with plain maps, a session has its own", "leave it out");
     // What will be needed after the long work is refused before it.
     relight_options(a.relight);
-    for (const std::string& light : a.relight.lights) parse_light(light);
+    require_readable_lights(a.relight);
     for (const std::string& file : a.relight.environments) read_environment(file);
     const Source source = load_source(a);
     if (relit_wanted && !source.shading)
         throw InputError("plain maps cannot be relit: they have no shading maps",
                          "use a processed session as --source");
-    const NormalMap target = load_target(a);
+    const Target target = load_target(a);
     const ControlMaps control = load_control(a);
     const std::vector<CarriedMap> carried = load_carried(a, source.maps.normals.valid.size());
-    const TransferResult moved = transfer_texture(source.maps, target, a.options, work, control);
+    const TransferResult moved = transfer_texture(source.maps, target.normals, a.options, work, control);
 
     write_png(a.out / "albedo.png",
               viewable(moved.albedo.albedo, viewing_gain(source.maps.albedo.albedo, source.maps.albedo.valid)));
@@ -151,7 +168,8 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
     for (const CarriedMap& map : carried) write_map_picture(a.out / map.name, map.map.read_through(moved.coordinates));
     std::vector<fs::path> relit;
     if (relit_wanted)
-        relit = write_relit_pictures(a, {moved.normals, moved.albedo, moved.index, *source.shading}, work);
+        relit =
+            write_relit_pictures(a, {moved.normals, moved.albedo, moved.index, *source.shading, target.geometry}, work);
 
     CommandResult result;
     result.json = {{"out", a.out.string()},
@@ -204,6 +222,8 @@ void add_transfer_command(CommandLine& line) {
     command.add_option("--window", a->options.window, "Side of the window, pixels, odd")->capture_default_str();
     command.add_option("--coarse-window", a->options.coarse_window, "analogies: side of the window one level up, odd")
         ->capture_default_str();
+    command.add_flag("--exact-search", a->options.exact_search,
+                     "analogies: compare with every pixel of the source, for tests: slow");
     command.add_option("--kappa", a->options.kappa, "Coherence weight: what continues a neighbour's patch wins")
         ->capture_default_str();
     command.add_option("--normal-weight", a->options.normal_weight, "Weight of normals against albedo")
