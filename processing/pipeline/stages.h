@@ -77,6 +77,7 @@ struct NormalsSummary {
     std::optional<double> mean_angular_error_deg;  ///< where truth came with the pictures
     std::optional<HeightFacts> height;             ///< none where the surface was left out
     StageSeconds seconds;
+    double intensity_seconds = 0;            ///< of estimating the lamps' intensities
     double megapixel_images_per_second = 0;  ///< of the solver
     std::vector<std::string> warnings;
 };

@@ -86,6 +86,7 @@ ordered_json to_json(const NormalsSummary& summary) {
                       {"seconds", seconds_json(summary.seconds)},
                       {"megapixel_images_per_second", summary.megapixel_images_per_second},
                       {"warnings", summary.warnings}};
+    json["seconds"]["intensities"] = summary.intensity_seconds;
     if (summary.height) json["height"] = height_json(*summary.height);
     if (summary.mean_angular_error_deg) json["mean_angular_error_deg"] = *summary.mean_angular_error_deg;
     return json;
