@@ -51,9 +51,14 @@ CaptureOrder parse_capture_order(const std::string& body) {
             order.resume = text(value, key);
         } else if (key == "lamps") {
             order.lamps = texts(value, key);
+        } else if (key == "mode") {
+            order.mode = sync_mode_from_name(text(value, key));
+            if (!order.mode)
+                throw InputError(fmt::format("unknown mode \"{}\"", text(value, key)),
+                                 "known: settled, predictive, strobed");
         } else {
             throw InputError(fmt::format("unknown key \"{}\"", key.substr(0, longest_text)),
-                             "known: object, lamps, name, resume");
+                             "known: object, lamps, mode, name, resume");
         }
     }
     return order;
@@ -64,6 +69,7 @@ Json to_json(const CaptureOrder& order) {
     if (!order.object.empty()) json["object"] = order.object;
     if (!order.name.empty()) json["name"] = order.name;
     if (!order.lamps.empty()) json["lamps"] = order.lamps;
+    if (order.mode) json["mode"] = name(*order.mode);
     if (order.resume) json["resume"] = *order.resume;
     return json;
 }
