@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "rig/lamps/lamp_array.h"
+#include "rig/lamps/strobed_lamps.h"
 #include "sim/faults.h"
 #include "sim/sim_clock.h"
 
@@ -15,8 +17,9 @@ struct LampShare {
     double share = 0.0;
 };
 
-/// Lamps that switch at once and remember when. Refers to the clock. Thread-compatible.
-class SimLamps final : public LampArray {
+/// Lamps that switch at once and remember when, by command or by the simulated camera's strobe. Refers to the clock.
+/// Thread-compatible.
+class SimLamps final : public LampArray, public StrobedLamps {
 public:
     SimLamps(std::size_t count, const SimClock& clock, FaultPlan faults = {});
     ~SimLamps() override;
@@ -25,6 +28,14 @@ public:
     void light(LampId lamp, double level) override;
     void dark() override;
     LampHealth health() override { return {}; }
+    StrobedLamps* strobed() override { return this; }
+    void arm(const std::vector<StrobeStep>& program) override;
+    std::vector<StrobeEvent> take_events() override;
+
+    /// The strobe line fell. Moments come in the order of time, and none after now.
+    void strobe(TimePoint moment);
+    /// Called before every command, to bring strobes up to date that fell before it.
+    void set_strobe_source(std::function<void()> catch_up) { catch_up_ = std::move(catch_up); }
 
     /// The lamps that really burned during the interval, by id; those that did not are left out.
     std::vector<LampShare> burning_during(const Interval& interval) const;
@@ -39,13 +50,19 @@ private:
         std::vector<LampShare> burning;
     };
 
-    void command(std::vector<LampShare> commanded);
+    void check(LampId lamp, double level) const;
+    void catch_up() const;
+    void command(TimePoint when, std::vector<LampShare> commanded);
     std::vector<LampShare> really_burning(std::vector<LampShare> commanded, std::uint64_t call) const;
 
     std::size_t count_;
     const SimClock& clock_;
     FaultPlan faults_;
     std::vector<Switch> history_;
+    std::function<void()> catch_up_;
+    std::vector<StrobeStep> program_;
+    std::size_t next_step_ = 0;  ///< of the program; its size: none is left
+    std::vector<StrobeEvent> events_;
 };
 
 }  // namespace darkbox::sim

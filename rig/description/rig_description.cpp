@@ -278,7 +278,9 @@ CameraDescription read_camera(TomlSection& section) {
 
 CaptureDescription read_capture(TomlSection& section) {
     CaptureDescription capture;
-    section.allow({"frame_deadline_s", "tries", "min_signal", "max_dark"});
+    section.allow({"mode", "frame_deadline_s", "tries", "min_signal", "max_dark"});
+    capture.mode = *sync_mode_from_name(
+        section.choice("mode", std::string(name(capture.mode)), {"settled", "predictive", "strobed"}));
     capture.frame_deadline =
         Seconds(section.number("frame_deadline_s", {0.01, 600}).value_or(capture.frame_deadline.count()));
     capture.tries = static_cast<int>(section.integer("tries", {1, 100}).value_or(capture.tries));
@@ -358,6 +360,24 @@ void refuse_huge(std::uintmax_t size, const std::string& origin) {
 }
 
 }  // namespace
+
+std::string_view name(SyncMode mode) {
+    switch (mode) {
+        case SyncMode::settled:
+            return "settled";
+        case SyncMode::predictive:
+            return "predictive";
+        case SyncMode::strobed:
+            break;
+    }
+    return "strobed";
+}
+
+std::optional<SyncMode> sync_mode_from_name(std::string_view text) {
+    for (const SyncMode mode : {SyncMode::settled, SyncMode::predictive, SyncMode::strobed})
+        if (name(mode) == text) return mode;
+    return std::nullopt;
+}
 
 RigDescription parse_rig(const std::string& toml, const std::string& origin) {
     refuse_huge(toml.size(), origin);

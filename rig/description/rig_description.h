@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "acquisition/frame/units.h"
@@ -51,7 +52,17 @@ struct CameraDescription {
     std::optional<std::array<double, 2>> principal_px;  ///< none: the picture's centre
 };
 
+/// How lamps and exposures are kept together.
+enum class SyncMode {
+    settled,     ///< switch, wait for the first frame that begins after it: two frame periods a lamp or more
+    predictive,  ///< switch in the gap between exposures, found from the timestamps: one frame period a lamp
+    strobed,     ///< the lamp controller steps at the camera's strobe: one frame period a lamp
+};
+std::string_view name(SyncMode mode);
+std::optional<SyncMode> sync_mode_from_name(std::string_view name);
+
 struct CaptureDescription {
+    SyncMode mode = SyncMode::settled;
     Seconds frame_deadline{5.0};  ///< the longest wait for one frame
     int tries = 3;                ///< per shot, before the session fails
     double min_signal = 0.002;    ///< a lit frame's mean must exceed the dark frame's by this share of full scale
