@@ -266,10 +266,6 @@ EmulatedBoard::Handshake EmulatedBoard::in(std::uint8_t endpoint, std::vector<st
 
 bool EmulatedBoard::setup_waits() const { return (chip_->endpoint_flags(0) & 1 << 3) != 0; }
 
-bool EmulatedBoard::has_packet(std::uint8_t endpoint) const {
-    return (chip_->endpoint_flags(endpoint) & (1 << 0 | 1 << 7)) == 0;
-}
-
 void EmulatedBoard::bus_reset() { avr_ioctl(chip_->avr, AVR_IOCTL_USB_RESET, nullptr); }
 
 }  // namespace darkbox::test
