@@ -34,7 +34,7 @@ void damage(std::vector<std::byte>& bytes) {
 
 }  // namespace
 
-SimCamera::SimCamera(const Scene& scene, const SimLamps& lamps, SimClock& clock, SimCameraOptions options)
+SimCamera::SimCamera(const Scene& scene, const LampWitness& lamps, SimClock& clock, SimCameraOptions options)
     : scene_(scene),
       lamps_(lamps),
       clock_(clock),

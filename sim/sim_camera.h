@@ -6,10 +6,10 @@
 
 #include "acquisition/camera/camera.h"
 #include "sim/faults.h"
+#include "sim/lamp_witness.h"
 #include "sim/renderer.h"
 #include "sim/sensor.h"
 #include "sim/sim_clock.h"
-#include "sim/sim_lamps.h"
 
 namespace darkbox::sim {
 
@@ -34,7 +34,7 @@ struct ExposureTruth {
 /// Refers to scene, lamps and clock. Configuring again is allowed while not streaming. Thread-compatible.
 class SimCamera final : public Camera {
 public:
-    SimCamera(const Scene& scene, const SimLamps& lamps, SimClock& clock, SimCameraOptions options);
+    SimCamera(const Scene& scene, const LampWitness& lamps, SimClock& clock, SimCameraOptions options);
     ~SimCamera() override;
 
     CameraInfo configure(const CameraConfig& config) override;
@@ -65,7 +65,7 @@ private:
     const RgbImage& picture_of(LampId lamp);
 
     const Scene& scene_;
-    const SimLamps& lamps_;
+    const LampWitness& lamps_;
     SimClock& clock_;
     SimCameraOptions options_;
     State state_ = State::closed;

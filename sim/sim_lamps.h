@@ -5,18 +5,13 @@
 
 #include "rig/lamps/lamp_array.h"
 #include "sim/faults.h"
+#include "sim/lamp_witness.h"
 #include "sim/sim_clock.h"
 
 namespace darkbox::sim {
 
-/// A lamp and how much light it gave: 1 = full level during a whole exposure.
-struct LampShare {
-    LampId lamp;
-    double share = 0.0;
-};
-
 /// Lamps that switch at once and remember when. Refers to the clock. Thread-compatible.
-class SimLamps final : public LampArray {
+class SimLamps final : public LampArray, public LampWitness {
 public:
     SimLamps(std::size_t count, const SimClock& clock, FaultPlan faults = {});
     ~SimLamps() override;
@@ -26,26 +21,20 @@ public:
     void dark() override;
     LampHealth health() override { return {}; }
 
-    /// The lamps that really burned during the interval, by id; those that did not are left out.
-    std::vector<LampShare> burning_during(const Interval& interval) const;
+    std::vector<LampShare> burning_during(const Interval& interval) const override;
     /// How often light() and dark() were called.
     std::uint64_t switches() const { return history_.size() - 1; }
     /// Whether nothing was commanded to burn last, and nothing is stuck.
     bool all_dark() const { return history_.back().burning.empty(); }
 
 private:
-    struct Switch {
-        TimePoint when;
-        std::vector<LampShare> burning;
-    };
-
     void command(std::vector<LampShare> commanded);
     std::vector<LampShare> really_burning(std::vector<LampShare> commanded, std::uint64_t call) const;
 
     std::size_t count_;
     const SimClock& clock_;
     FaultPlan faults_;
-    std::vector<Switch> history_;
+    std::vector<LampSwitch> history_;
 };
 
 }  // namespace darkbox::sim

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "acquisition/device/device_error.h"
 
@@ -89,23 +90,49 @@ void UsbLamps::light(LampId lamp, double level) {
     LightCommand light{};
     light.lamps[output / 8] = static_cast<std::uint8_t>(1U << output % 8);
     light.level = level_of(level);
-    controller_.command(Command::light, light);
+    try {
+        controller_.command(Command::light, light);
+        lit_ = true;
+    } catch (const DeviceError&) {
+        loss_told_ = controller_.gone();
+        throw;
+    }
 }
 
 void UsbLamps::dark() {
-    try {
-        controller_.command(Command::dark);
-        const Status status = controller_.status();
-        if (status.activity != Activity::dark)
-            throw DeviceError("the lamp controller says that it is not dark", "cut the lamps' supply");
-        if (status.faults == 0) return;
-        controller_.command(Command::clear_faults, ClearCommand{status.faults, {}});
+    if (darken()) {
+        lit_ = false;
         return;
-    } catch (const DeviceError&) {
-        if (!controller_.gone() && controller_.status().activity == Activity::dark) throw;
     }
     controller_.reconnect();  // one that was unplugged, reset or hung, and comes back dark
     set_up();
+    const bool interrupted = std::exchange(lit_, false);
+    const bool told = std::exchange(loss_told_, false);
+    if (interrupted && !told)
+        throw DeviceError("the lamp controller was lost while a lamp was lit, and came back dark",
+                          "check its cable and its supply");
+}
+
+/// False when the board cannot be reached.
+bool UsbLamps::darken() {
+    try {
+        controller_.command(Command::dark);
+        const Status status = controller_.status();
+        if (status.activity != Activity::dark) return false;
+        if (status.faults != 0) controller_.command(Command::clear_faults, ClearCommand{status.faults, {}});
+        return true;
+    } catch (const DeviceError&) {
+        if (!controller_.gone() && is_dark()) throw;  // it says why it will not light again
+        return false;
+    }
+}
+
+bool UsbLamps::is_dark() {
+    try {
+        return controller_.status().activity == Activity::dark;
+    } catch (const DeviceError&) {
+        return false;
+    }
 }
 
 LampHealth UsbLamps::health() {

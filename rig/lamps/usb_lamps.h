@@ -30,7 +30,8 @@ struct LampStepDone {
 };
 
 /// Lamps on the project's own controller. The board darkens them by itself when this process dies or hangs, when a lamp
-/// reached its max_on or max_duty, and when it is unplugged; dark() waits for a board that was unplugged to come back.
+/// reached its max_on or max_duty, and when it is unplugged; dark() waits for a board that was unplugged to come back,
+/// and throws even so when that interrupted a lamp's light and nobody was told yet: the shot is to be taken again.
 /// Thread-compatible; the heartbeat has a thread of its own.
 class UsbLamps final : public LampArray {
 public:
@@ -62,11 +63,15 @@ private:
 
     void check(const RigDescription& rig) const;
     void set_up();
+    bool darken();
+    bool is_dark();
     lamp_protocol::Step step_of(const LampStep& step) const;
 
     std::vector<Channel> channels_;
     LampController controller_;
     std::uint64_t events_lost_before_ = 0;
+    bool lit_ = false;        ///< as far as is known here
+    bool loss_told_ = false;  ///< of the board, since it was last reached
 };
 
 }  // namespace darkbox

@@ -127,6 +127,10 @@ EmulatedBoard::~EmulatedBoard() { avr_terminate(chip_->avr); }
 std::uint64_t EmulatedBoard::cycle() const { return chip_->avr->cycle; }
 
 void EmulatedBoard::step() {
+    if (in_bootloader()) {  // the chip's own loader is not here; time passes in it
+        chip_->avr->cycle += cycles_per_us;
+        return;
+    }
     const int state = avr_run(chip_->avr);
     if (state == cpu_Done || state == cpu_Crashed) throw std::runtime_error("the emulated chip stopped");
     const std::uint32_t pc = chip_->avr->pc;

@@ -169,6 +169,12 @@ void PacedBoard::watch_presence() {
         fail_all(-ENODEV);
         if (on_presence) on_presence(false);
     }
+    if (present_ && board_.in_bootloader()) {  // whoever programs it starts it again: here, at once
+        board_.brown_out();
+        present_ = false;
+        fail_all(-ENODEV);
+        if (on_presence) on_presence(false);
+    }
     if (present_ || !board_.attached()) return;
     enumerate();
     present_ = true;
