@@ -62,6 +62,7 @@ LampImage read_lamp_image(const std::filesystem::path& file) {
     int number = 0;
     for (std::string text; std::getline(in, text) && !ended;) {
         ++number;
+        if (text.find_first_not_of(" \r") == std::string::npos) continue;
         const auto line = read_line(text);
         if (!line) refuse(file, fmt::format("line {} is damaged, or the file is no Intel HEX", number));
         const std::uint8_t kind = (*line)[3];

@@ -100,6 +100,7 @@ std::string outcome_in_words(const Event& reply) {
         case Outcome::out_of_range:
             return fmt::format("a value out of range, in byte {}", reply.detail);
         case Outcome::fault_stands:
+            if (faults_in_words(reply.detail).empty()) return "a fault stands that this darkbox does not know";
             return fmt::format("{}", fmt::join(faults_in_words(reply.detail), "; "));
         case Outcome::program_runs:
             return fmt::format("a program runs, at step {}", reply.detail);

@@ -169,12 +169,7 @@ void PacedBoard::watch_presence() {
         fail_all(-ENODEV);
         if (on_presence) on_presence(false);
     }
-    if (present_ && board_.in_bootloader()) {  // whoever programs it starts it again: here, at once
-        board_.brown_out();
-        present_ = false;
-        fail_all(-ENODEV);
-        if (on_presence) on_presence(false);
-    }
+    if (board_.in_bootloader()) board_.brown_out();  // whoever programs it starts it again: here, at once
     if (present_ || !board_.attached()) return;
     enumerate();
     present_ = true;
