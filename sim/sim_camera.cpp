@@ -34,7 +34,11 @@ void damage(std::vector<std::byte>& bytes) {
 
 }  // namespace
 
+<<<<<<< HEAD
 SimCamera::SimCamera(const Scene& scene, SimLamps& lamps, SimClock& clock, SimCameraOptions options)
+=======
+SimCamera::SimCamera(const Scene& scene, const LampWitness& lamps, SimClock& clock, SimCameraOptions options)
+>>>>>>> firmware
     : scene_(scene),
       lamps_(lamps),
       clock_(clock),

@@ -6,10 +6,10 @@
 
 #include "acquisition/camera/camera.h"
 #include "sim/faults.h"
+#include "sim/lamp_witness.h"
 #include "sim/renderer.h"
 #include "sim/sensor.h"
 #include "sim/sim_clock.h"
-#include "sim/sim_lamps.h"
 
 namespace darkbox::sim {
 
@@ -35,7 +35,11 @@ struct ExposureTruth {
 /// Thread-compatible.
 class SimCamera final : public Camera {
 public:
+<<<<<<< HEAD
     SimCamera(const Scene& scene, SimLamps& lamps, SimClock& clock, SimCameraOptions options);
+=======
+    SimCamera(const Scene& scene, const LampWitness& lamps, SimClock& clock, SimCameraOptions options);
+>>>>>>> firmware
     ~SimCamera() override;
 
     CameraInfo configure(const CameraConfig& config) override;
@@ -67,7 +71,11 @@ private:
     const RgbImage& picture_of(LampId lamp);
 
     const Scene& scene_;
+<<<<<<< HEAD
     SimLamps& lamps_;
+=======
+    const LampWitness& lamps_;
+>>>>>>> firmware
     SimClock& clock_;
     SimCameraOptions options_;
     State state_ = State::closed;

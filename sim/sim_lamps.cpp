@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
-#include <map>
 #include <utility>
 
 #include "acquisition/device/device_error.h"
@@ -91,17 +89,7 @@ std::vector<LampShare> SimLamps::really_burning(std::vector<LampShare> burning, 
 }
 
 std::vector<LampShare> SimLamps::burning_during(const Interval& interval) const {
-    std::map<LampId, double> seconds;
-    for (std::size_t i = 0; i < history_.size(); ++i) {
-        const TimePoint end = i + 1 < history_.size() ? history_[i + 1].when : interval.end;
-        const Nanoseconds overlap = std::min(end, interval.end) - std::max(history_[i].when, interval.begin);
-        if (overlap <= Nanoseconds(0)) continue;
-        for (const LampShare& b : history_[i].burning) seconds[b.lamp] += b.share * to_seconds(overlap);
-    }
-    std::vector<LampShare> shares;
-    const double whole = to_seconds(interval.end - interval.begin);
-    for (const auto& [lamp, lit] : seconds) shares.push_back({lamp, lit / whole});
-    return shares;
+    return sim::burning_during(history_, interval);
 }
 
 }  // namespace darkbox::sim

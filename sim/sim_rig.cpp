@@ -48,7 +48,9 @@ SimRig SimRig::make(const RigDescription& rig, const FaultPlan& faults) {
     options.latency_frames = rig.sim.latency_frames;
     options.queue_depth = rig.sim.queue_depth;
     options.faults = faults;
-    result.camera_ = std::make_unique<SimCamera>(*result.scene_, *result.lamps_, *result.clock_, options);
+    if (!rig.sim.lamps_seen.empty()) result.seen_ = std::make_unique<SeenLamps>(rig);
+    const LampWitness& witness = result.seen_ ? static_cast<const LampWitness&>(*result.seen_) : *result.lamps_;
+    result.camera_ = std::make_unique<SimCamera>(*result.scene_, witness, *result.clock_, options);
     return result;
 }
 

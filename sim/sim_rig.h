@@ -6,6 +6,7 @@
 #include "rig/description/rig_description.h"
 #include "sim/faults.h"
 #include "sim/scene.h"
+#include "sim/seen_lamps.h"
 #include "sim/sim_camera.h"
 #include "sim/sim_clock.h"
 #include "sim/sim_lamps.h"
@@ -24,6 +25,7 @@ public:
     static SimRig make(const RigDescription& rig, const FaultPlan& faults = {});
 
     SimClock& clock() { return *clock_; }
+    /// Where sim.lamps_seen names a file, the camera does not see these.
     SimLamps& lamps() { return *lamps_; }
     SimCamera& camera() { return *camera_; }
     const Scene& scene() const { return *scene_; }
@@ -37,6 +39,7 @@ private:
     std::unique_ptr<const Scene> scene_;
     std::unique_ptr<SimClock> clock_;
     std::unique_ptr<SimLamps> lamps_;
+    std::unique_ptr<SeenLamps> seen_;  ///< what the camera sees instead
     std::unique_ptr<SimCamera> camera_;
 };
 

@@ -21,6 +21,7 @@ struct LampDescription {
     int address = -1;                     ///< driver "gpio", multiplexed: what the decoder turns into this lamp
     std::array<double, 3> position_mm{};  ///< rig frame: x right, y up, z to the camera, origin at the object
     Seconds max_on{2.0};                  ///< longest continuous on-time
+    double max_duty = 0.5;                ///< driver "usb": share of a long time that it may shine
     Seconds settle{0.005};                ///< from switch to steady light
 };
 
@@ -35,6 +36,12 @@ struct MultiplexerDescription {
 struct GpioDescription {
     std::string chip;                                   ///< its label
     std::optional<MultiplexerDescription> multiplexer;  ///< none: one line a lamp
+};
+
+/// [lamps.usb], of driver "usb".
+struct UsbDescription {
+    std::string serial;      ///< empty: the only lamp controller there is
+    Seconds heartbeat{1.0};  ///< silence after which the controller darkens the lamps
 };
 
 struct CameraDescription {
@@ -81,7 +88,8 @@ struct SimDescription {
     int latency_frames = 1;
     int queue_depth = 2;
     std::uint64_t seed = 1;
-    bool real_time = false;  ///< virtual time otherwise
+    bool real_time = false;            ///< virtual time otherwise
+    std::filesystem::path lamps_seen;  ///< the camera sees the lamps that this file tells of, not simulated ones
 };
 
 /// A rig.toml, parsed and valid. Plain data.
@@ -90,6 +98,7 @@ struct RigDescription {
     CameraDescription camera;
     std::string lamps_driver = "sim";  ///< "gpio", "usb" or "sim"
     GpioDescription gpio;
+    UsbDescription usb;
     std::vector<LampDescription> lamps;
     bool distant_lamps = false;  ///< their light is parallel: behind collimators, or simulated so
     std::optional<double> ball_diameter_mm;
