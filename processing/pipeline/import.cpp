@@ -12,6 +12,7 @@
 #include "processing/formats/atomic_file.h"
 #include "processing/formats/light_files.h"
 #include "processing/formats/picture.h"
+#include "processing/formats/picture_header.h"
 #include "processing/formats/png.h"
 #include "processing/pipeline/given_lights.h"
 #include "processing/pipeline/session_files.h"
@@ -132,7 +133,7 @@ Extra mask_extra(const fs::path& path, const char* name, const Inspected& first)
         throw InputError(fmt::format("the mask {} is black everywhere", path.string()),
                          "white is the object in a mask");
     std::vector<std::byte> bytes = read_file(path);
-    if (decode_picture(bytes, path.string()).format != PictureFormat::png) bytes = encode_png(mask);
+    if (require_picture_format(bytes, path.string()) != PictureFormat::png) bytes = encode_png(mask);
     return {name, std::move(bytes)};
 }
 

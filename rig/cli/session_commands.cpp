@@ -54,7 +54,7 @@ void add_session_commands(CommandLine& line) {
     CLI::App& command =
         take_session(line.add("export", "Write results for other programs", "darkbox export s --format ply --out s.ply",
                               [a](const WorkContext& work) { return export_to(a->session, a->format, a->out, work); }));
-    command.add_option("--format", a->format, "lp, diligent, ptm, ptm-rgb, relight or ply")->required();
+    command.add_option("--format", a->format, "lp, diligent, ptm, ptm-rgb, relight, relight-rgb or ply")->required();
     command.add_option("--out", a->out, "File or folder to write")->required();
 }
 

@@ -126,15 +126,18 @@ std::vector<CarriedMap> load_carried(const Arguments& a, cv::Size source) {
 /// relit-1.png, relit-2.png, ... one for each light, then one for each environment.
 std::vector<fs::path> write_relit_pictures(const Arguments& a, const RelightScene& scene, const WorkContext& work) {
     const RelightOptions options = relight_options(a.relight);
-    const PictureStyle style{.gain = viewing_gain(scene.albedo.albedo, scene.albedo.valid)};
     const Relighter relighter(scene, work);
     std::vector<fs::path> written;
-    const auto write = [&](const Lighting& lighting) {
+    const auto write = [&](const Lighting& lighting, double gain) {
         written.push_back(a.out / fmt::format("relit-{}.png", written.size() + 1));
-        render_to_file(relighter, lighting, options, style, written.back(), work);
+        render_to_file(relighter, lighting, options, {.gain = gain}, written.back(), work);
     };
-    for (const Light& light : lights_of(a.relight, scene)) write(Lights{light});
-    for (const std::string& file : a.relight.environments) write(relighter.fold(read_environment(file), options, work));
+    const double gain = viewing_gain(scene.albedo.albedo, scene.albedo.valid);
+    for (const Light& light : lights_of(a.relight, scene)) write(Lights{light}, gain);
+    for (const std::string& file : a.relight.environments) {
+        const FoldedEnvironment folded = relighter.fold(read_environment(file), options, work);
+        write(folded, gain_under(folded, relighter, options, scene.normals.valid, work));
+    }
     return written;
 }
 

@@ -196,7 +196,9 @@ TEST_F(Import, TextureMapsAreExportedAndTheirErrorsAreClear) {
     export_session(session, export_format("ptm-rgb"), at("rgb.ptm"));
     export_session(session, export_format("relight"), at("web"));
     EXPECT_GT(fs::file_size(at("rgb.ptm")), 96u * 80u * 18u);
+    export_session(session, export_format("relight-rgb"), at("web-rgb"));
     EXPECT_TRUE(fs::exists(at("web/info.json")) && fs::exists(at("web/plane_2.jpg")));
+    EXPECT_TRUE(fs::exists(at("web-rgb/plane_5.jpg")));
     EXPECT_THAT(input_error_of([&] { export_session(session, ExportFormat::ptm, "/proc/none/s.ptm"); }),
                 HasSubstr("/proc/none"));
 }
