@@ -146,8 +146,8 @@ TEST(CameraFaults, AHangForEverIsAnErrorWithinItsDeadlines) {
         if (call == "next_frame" && bench.camera.delivered == 5)
             bench.camera.hanging = bench.camera.hangs_for_ever = true;
     };
-    EXPECT_THAT(bench.error<DeviceError>(),
-                AllOf(HasSubstr("lamp 'lamp-0"), HasSubstr("no good frame in 3 tries"), HasSubstr("delivered nothing")));
+    EXPECT_THAT(bench.error<DeviceError>(), AllOf(HasSubstr("lamp 'lamp-0"), HasSubstr("no good frame in 3 tries"),
+                                                  HasSubstr("delivered nothing")));
     EXPECT_TRUE(bench.lamps.is_dark());
     // Once in the light, for as long as the lamp bears; then twice in the dark, for frame_deadline.
     EXPECT_LT(to_seconds(bench.clock.now() - begin), 2.1 + 2 * 5.1 + 1);
