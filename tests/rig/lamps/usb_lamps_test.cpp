@@ -98,9 +98,9 @@ TEST_F(UsbLampsTest, AreDarkAfterTheirDestructor) {
 }
 
 TEST_F(UsbLampsTest, TheHeartbeatKeepsALampLit) {
-    UsbLamps lamps(rig_of("LC-0001", 0.1));
+    UsbLamps lamps(rig_of("LC-0001", 0.25));
     lamps.light(LampId{2}, 1.0);
-    std::this_thread::sleep_for(400ms);
+    std::this_thread::sleep_for(700ms);
     EXPECT_EQ(lit(), bit(14));
 }
 
