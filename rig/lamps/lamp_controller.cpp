@@ -36,6 +36,7 @@ LampController::~LampController() {
         dark_by_request();
     } catch (const Error&) {  // NOLINT(bugprone-empty-catch): the board hears nothing more, and darkens by itself
     }
+    link_.reset();  // while what its packets go to is still here
 }
 
 UsbLink& LampController::link() const {

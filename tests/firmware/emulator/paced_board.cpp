@@ -126,6 +126,7 @@ bool PacedBoard::attempt(UsbRequest& request) {
         const auto answer = host_.control(request.control, request.data);
         request.error = error_of(answer.handshake);
         if ((request.control.type & 0x80) != 0) request.data = answer.bytes;
+        if (alter_answer) alter_answer(request.control, request.data);
         return true;
     }
     const std::uint8_t number = request.endpoint & 0x0F;

@@ -44,6 +44,8 @@ public:
 
     std::vector<std::uint8_t> device_descriptor;
     std::vector<std::uint8_t> configuration_descriptor;
+    /// May change what a host gets to a request, on the board's thread: a board that is not as it should be.
+    std::function<void(const ControlRequest&, std::vector<std::uint8_t>&)> alter_answer;
     /// Called on the board's thread when it went away by a reset, and when it is back.
     std::function<void(bool present)> on_presence;
 

@@ -2,14 +2,9 @@
 
 #include <gmock/gmock.h>
 
-#include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <random>
-
 #include "rig/lamps/device_clock.h"
 #include "tests/rig/lamps/lamp_packets_input.h"
+#include "tests/support/fuzz_corpus.h"
 
 namespace darkbox {
 namespace {
@@ -64,19 +59,12 @@ TEST(DeviceClock, TheTightestExchangeCounts) {
     EXPECT_EQ(later->uncertainty, 1ms + 100us) << "a second older, and the crystals may have drifted";
 }
 
-TEST(LampPacketsFuzz, TwoHundredThousandInputsHold) {
-    std::vector<LampBytes> inputs;
-    for (const auto& file : std::filesystem::directory_iterator(DARKBOX_FUZZ_CORPUS)) {
-        std::ifstream in(file.path(), std::ios::binary);
-        inputs.emplace_back(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
-    }
-    ASSERT_GE(inputs.size(), 3U);
-    std::mt19937 random(20261128);
-    const auto below = [&](std::size_t n) { return std::uniform_int_distribution<std::size_t>(0, n - 1)(random); };
-    for (int i = 0; i < 200'000; ++i) {
-        LampBytes input = inputs[below(inputs.size())];
-        for (std::size_t changes = below(6); changes > 0; --changes)
-            input[below(input.size())] = static_cast<std::uint8_t>(below(256));
+TEST(LampPacketsFuzz, InputsMadeFromTheCorpusHold) {
+    const auto corpus = test::read_corpus(DARKBOX_FUZZ_CORPUS);
+    ASSERT_GE(corpus.size(), 3U);
+    test::FuzzGenerator generator(corpus);
+    for (long i = 0, inputs = test::fuzz_inputs(200'000); i < inputs; ++i) {
+        const auto input = generator.next();
         ASSERT_NO_THROW(test::play_to_lamp_packets(input.data(), input.size())) << "input " << i;
     }
 }

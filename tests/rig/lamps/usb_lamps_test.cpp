@@ -98,9 +98,9 @@ TEST_F(UsbLampsTest, AreDarkAfterTheirDestructor) {
 }
 
 TEST_F(UsbLampsTest, TheHeartbeatKeepsALampLit) {
-    UsbLamps lamps(rig_of("LC-0001", 0.1));
+    UsbLamps lamps(rig_of("LC-0001", 0.25));
     lamps.light(LampId{2}, 1.0);
-    std::this_thread::sleep_for(400ms);
+    std::this_thread::sleep_for(700ms);
     EXPECT_EQ(lit(), bit(14));
 }
 
@@ -253,6 +253,23 @@ TEST_F(UsbLampsTest, AStrobeThatStaysOutIsTold) {
     }
     lamps.dark();
     EXPECT_TRUE(lamps.health().problems.empty());
+}
+
+TEST_F(UsbLampsTest, AnotherVersionOfTheProtocolIsRefusedInWords) {
+    bed->board(board).with_board([&](EmulatedBoard&, EmulatedHost&) {
+        bed->board(board).alter_answer = [](const test::ControlRequest& request, std::vector<std::uint8_t>& answer) {
+            const bool info = request.type == EmulatedHost::vendor_in && request.request == 1;
+            if (info) answer.at(offsetof(Info, protocol_major)) = version_major + 1;
+        };
+    });
+    try {
+        UsbLamps lamps(rig_of("LC-0001"));
+        FAIL() << "it speaks another version";
+    } catch (const DeviceError& error) {
+        EXPECT_THAT(error.what(), HasSubstr("speaks version 2.0 of the lamp protocol, this darkbox version 1.0"));
+        EXPECT_THAT(error.hint(), HasSubstr("darkbox lamps flash"));
+    }
+    EXPECT_EQ(lit(), 0U);
 }
 
 TEST_F(UsbLampsTest, WhatTheBoardCannotDoIsRefused) {
