@@ -151,6 +151,9 @@ cv::Mat1b read_mask(const fs::path& path) {
     const cv::Mat1f grey = mean_channel(read_picture(path).samples);
     cv::Mat1b mask;
     cv::compare(grey, 0.5, mask, cv::CMP_GE);
+    if (cv::countNonZero(mask) == 0)
+        throw InputError(fmt::format("the mask {} is black everywhere", path.string()),
+                         "a mask is white where the object is");
     return mask;
 }
 

@@ -42,7 +42,8 @@ cv::Mat1b clipped_samples(const Picture& picture);
 /// samples that are not finite.
 Picture read_picture(const std::filesystem::path& path);
 
-/// 255 where the picture's channel mean is at least half of full scale; anti-aliased edges are cut there.
+/// 255 where the picture's channel mean is at least half of full scale; anti-aliased edges are cut there. Throws
+/// InputError for a picture that is black everywhere.
 cv::Mat1b read_mask(const std::filesystem::path& path);
 
 }  // namespace darkbox

@@ -27,9 +27,9 @@ namespace fs = std::filesystem;
 constexpr std::size_t photographs_at_once = 4;
 constexpr std::size_t band_bytes = std::size_t{128} << 20;  ///< of photographs in memory while texture maps are fitted
 
-cv::Mat sixteen_bit(const cv::Mat3f& image) {
+cv::Mat sixteen_bit(const cv::Mat3f& image, double scale) {
     cv::Mat words;
-    image.convertTo(words, CV_16U, 65535.0);
+    image.convertTo(words, CV_16U, 65535.0 * scale);
     return words;
 }
 
@@ -55,7 +55,14 @@ void require_light_for_each(const Session& session, const Lights& lights) {
             "calibrate the session again");
 }
 
-/// DiLiGenT: 001.png..., and a line per photograph in each list. Lights that cannot be used are left out.
+double peak(const cv::Mat3f& image) {
+    double top = 0;
+    cv::minMaxLoc(image.reshape(1), nullptr, &top);
+    return top;
+}
+
+/// DiLiGenT: 001.png..., and a line per photograph in each list. Lights that cannot be used are left out. A photograph
+/// brighter than 16 bits hold is scaled down, and its intensity with it, by which readers divide.
 void export_diligent(const Session& session, const fs::path& out, const WorkContext& work) {
     const Lights all = load_lights(session);
     require_light_for_each(session, all);
@@ -65,8 +72,10 @@ void export_diligent(const Session& session, const fs::path& out, const WorkCont
     for_each_photograph(session, "exporting", work, [&](std::size_t i, const Radiance& photograph) {
         if (!all[i].used) return;
         lights.push_back(all[i]);
+        const double scale = 1.0 / std::max(1.0, peak(photograph.image));
+        lights.back().intensity *= scale;
         const std::string name = fmt::format("{:03}.png", lights.size());
-        write_png(out / name, sixteen_bit(photograph.image));
+        write_png(out / name, sixteen_bit(photograph.image, scale));
         names += name + "\n";
     });
     write_light_directions(out / "light_directions.txt", lights);

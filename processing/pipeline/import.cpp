@@ -121,7 +121,7 @@ std::optional<fs::path> mask_of(const Survey& survey, const std::optional<fs::pa
                      fmt::format("say which one with {}", option));
 }
 
-/// The mask's bytes when it is a PNG already, else a PNG of it. It must fit the photographs and hold something.
+/// The mask's bytes when it is a PNG already, else a PNG of it. It must fit the photographs.
 Extra mask_extra(const fs::path& path, const char* name, const Inspected& first) {
     const cv::Mat1b mask = read_mask(path);
     const FrameRecord& frame = first.record;
@@ -129,9 +129,6 @@ Extra mask_extra(const fs::path& path, const char* name, const Inspected& first)
         throw InputError(fmt::format("the mask {} is {}x{} pixels but {} is {}x{}", path.string(), mask.cols, mask.rows,
                                      first.source.string(), frame.width, frame.height),
                          "give a mask of the photographs' size");
-    if (cv::countNonZero(mask) == 0)
-        throw InputError(fmt::format("the mask {} is black everywhere", path.string()),
-                         "white is the object in a mask");
     std::vector<std::byte> bytes = read_file(path);
     if (require_picture_format(bytes, path.string()) != PictureFormat::png) bytes = encode_png(mask);
     return {name, std::move(bytes)};

@@ -177,25 +177,26 @@ Guides guides_of(const TransferSource& source, const NormalMap& target, double s
     return guides;
 }
 
-/// The figures that cost memory come after the guides are gone.
+/// The same measures as measures.h takes of anybody's result, on a coarser grid. Those that cost memory come after the
+/// guides are gone.
 void measure(const TransferSource& source, const NormalMap& target, Guides guides, int window, TransferResult& result) {
     result.uncovered_deg = uncovered_deg(guides.from, guides.onto);
     result.coverage_deg =
         coverage_deg({guides.from.normal, guides.from.valid}, {guides.onto.normal, guides.onto.valid});
+    guides = {};
     result.coherence = coherence(result.coordinates);
+    const float white = source.white.value_or(white_level(source.albedo));
     PatchLayers from, onto;
     {
-        const Appearance shown = appearance_of({guides.from.normal, guides.from.valid},
-                                               {source.albedo.albedo, guides.from.valid}, guides.white);
-        const Appearance moved = appearance_of(target, result.albedo, guides.white);
-        result.histogram_distance = histogram_distance(shown, moved).value_or(0);
+        const Appearance shown = appearance_of(source.normals, source.albedo, white);
+        const Appearance moved = appearance_of(target, result.albedo, white);
+        result.histogram_distance = histogram_distance(shown, moved);
         from = colour_patches(shown, window);
         onto = colour_patches(moved, window);
     }
-    guides = {};
     // About a thousand patches, so that it costs little next to the synthesis at any size.
     const int sparse = std::max(16, std::max(target.valid.cols, target.valid.rows) / 32);
-    result.patch_energy = patch_energy(from, onto, window, sparse).value_or(0);
+    result.patch_energy = patch_energy(from, onto, window, sparse);
 }
 
 TransferResult transferred(const TransferSource& source, const NormalMap& target, const ControlMaps& control,

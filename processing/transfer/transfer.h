@@ -42,6 +42,8 @@ struct TransferSource {
     NormalMap normals;
     AlbedoMap albedo;
     IndexMap index;
+    /// The albedo that is shown as white where that is known, 1 for a picture; none: appearance.h's white_level.
+    std::optional<float> white = {};
 };
 
 /// A guide drawn by the user, beside the normals (Lefebvre and Hoppe 2005, section 4): where the target's map has a
@@ -59,10 +61,9 @@ struct TransferResult {
     cv::Mat1f uncovered_deg;  ///< angle from the target's normal to the nearest of the source's, to a degree or so
     double coverage_deg = 0;  ///< 95th percentile of that angle
     double coherence = 0;     ///< share of neighbouring target pixels whose source coordinates are neighbours alike
-    double patch_energy =
-        0;  ///< RMS over window x window patches to the nearest source patch, in 8-bit units, on a sampled grid
-    double histogram_distance =
-        0;               ///< mean quantile distance per channel between target and source albedo, 8-bit units
+    /// As TransferMeasures has them; patches of the target on a coarser grid. None where there is nothing to measure.
+    std::optional<double> patch_energy;
+    std::optional<double> histogram_distance;
     double seconds = 0;  ///< without the figures
 };
 

@@ -68,6 +68,7 @@ Source load_source(const Arguments& a) {
     TransferSource maps;
     maps.normals = mask.empty() ? read_normal_map(a.source_normals) : read_normal_map(a.source_normals, mask);
     maps.albedo = read_albedo_map(a.source_albedo, mask.empty() ? maps.normals.valid : mask);
+    if (a.source_albedo.extension() != ".exr") maps.white = 1.0F;
     return {std::move(maps), std::nullopt};
 }
 
@@ -141,6 +142,8 @@ std::vector<fs::path> write_relit_pictures(const Arguments& a, const RelightScen
     return written;
 }
 
+Json json_of(const std::optional<double>& figure) { return figure ? Json(*figure) : Json(); }
+
 CommandResult run(const Arguments& a, const WorkContext& work) {
     const bool relit_wanted =
         !a.relight.lights.empty() || !a.relight.lamp_positions.empty() || !a.relight.environments.empty();
@@ -160,8 +163,10 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
     const std::vector<CarriedMap> carried = load_carried(a, source.maps.normals.valid.size());
     const TransferResult moved = transfer_texture(source.maps, target.normals, a.options, work, control);
 
-    write_png(a.out / "albedo.png",
-              viewable(moved.albedo.albedo, viewing_gain(source.maps.albedo.albedo, source.maps.albedo.valid)));
+    // A picture's colours come out as they went in; radiance has no white of its own.
+    const AlbedoMap& albedo = source.maps.albedo;
+    const double gain = source.maps.white ? 1.0 / *source.maps.white : viewing_gain(albedo.albedo, albedo.valid);
+    write_png(a.out / "albedo.png", viewable(moved.albedo.albedo, gain));
     write_albedo_map(a.out / "albedo.exr", moved.albedo);
     write_coordinates(a.out / "coordinates.png", moved.coordinates);
     if (moved.index.texels > 0) write_index_map(a.out / "index.png", moved.index);
@@ -177,9 +182,9 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
     CommandResult result;
     result.json = {{"out", a.out.string()},
                    {"seconds", moved.seconds},
-                   {"patch_energy", moved.patch_energy},
+                   {"patch_energy", json_of(moved.patch_energy)},
                    {"coherence", moved.coherence},
-                   {"histogram_distance", moved.histogram_distance},
+                   {"histogram_distance", json_of(moved.histogram_distance)},
                    {"coverage_deg", moved.coverage_deg},
                    {"relit", Json::array()},
                    {"applied", Json::array()}};
@@ -191,9 +196,9 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
             fmt::format("the source does not show all of the target's normals: 5 % of them are more than {:.0f} "
                         "degrees from any of the source's; uncovered.exr shows where",
                         moved.coverage_deg));
-    result.text =
-        fmt::format("{}: {} x {} pixels in {:.1f} s, coherence {:.2f}, patch energy {:.1f}", a.out.string(),
-                    moved.coordinates.cols, moved.coordinates.rows, moved.seconds, moved.coherence, moved.patch_energy);
+    result.text = fmt::format("{}: {} x {} pixels in {:.1f} s, coherence {:.2f}", a.out.string(),
+                              moved.coordinates.cols, moved.coordinates.rows, moved.seconds, moved.coherence);
+    if (moved.patch_energy) result.text += fmt::format(", patch energy {:.1f}", *moved.patch_energy);
     return result;
 }
 
