@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "acquisition/frame/ids.h"
@@ -19,12 +20,18 @@ struct LampSwitch {
     std::vector<LampShare> burning;
 };
 
-/// Who knows which lamps really burned; what the simulated camera sees. Thread-compatible.
+/// Who knows which lamps really burned; what the simulated camera sees, and where its strobe line ends, which only some
+/// lamps listen to. Thread-compatible.
 class LampWitness {
 public:
     virtual ~LampWitness() = default;
     /// The lamps that really burned during the interval, by id; those that did not are left out.
     virtual std::vector<LampShare> burning_during(const Interval& interval) const = 0;
+
+    /// The strobe line fell. Moments come in the order of time, and none after now.
+    virtual void strobe(TimePoint /*moment*/) {}
+    /// Called before every command, to bring strobes up to date that fell before it.
+    virtual void set_strobe_source(std::function<void()> /*catch_up*/) {}
 };
 
 /// The same, of a history in the order of time.

@@ -34,11 +34,7 @@ void damage(std::vector<std::byte>& bytes) {
 
 }  // namespace
 
-<<<<<<< HEAD
-SimCamera::SimCamera(const Scene& scene, SimLamps& lamps, SimClock& clock, SimCameraOptions options)
-=======
-SimCamera::SimCamera(const Scene& scene, const LampWitness& lamps, SimClock& clock, SimCameraOptions options)
->>>>>>> firmware
+SimCamera::SimCamera(const Scene& scene, LampWitness& lamps, SimClock& clock, SimCameraOptions options)
     : scene_(scene),
       lamps_(lamps),
       clock_(clock),

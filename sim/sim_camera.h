@@ -35,11 +35,7 @@ struct ExposureTruth {
 /// Thread-compatible.
 class SimCamera final : public Camera {
 public:
-<<<<<<< HEAD
-    SimCamera(const Scene& scene, SimLamps& lamps, SimClock& clock, SimCameraOptions options);
-=======
-    SimCamera(const Scene& scene, const LampWitness& lamps, SimClock& clock, SimCameraOptions options);
->>>>>>> firmware
+    SimCamera(const Scene& scene, LampWitness& lamps, SimClock& clock, SimCameraOptions options);
     ~SimCamera() override;
 
     CameraInfo configure(const CameraConfig& config) override;
@@ -71,11 +67,7 @@ private:
     const RgbImage& picture_of(LampId lamp);
 
     const Scene& scene_;
-<<<<<<< HEAD
-    SimLamps& lamps_;
-=======
-    const LampWitness& lamps_;
->>>>>>> firmware
+    LampWitness& lamps_;
     SimClock& clock_;
     SimCameraOptions options_;
     State state_ = State::closed;

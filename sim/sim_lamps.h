@@ -12,20 +12,9 @@
 
 namespace darkbox::sim {
 
-<<<<<<< HEAD
-/// A lamp and how much light it gave: 1 = full level during a whole exposure.
-struct LampShare {
-    LampId lamp;
-    double share = 0.0;
-};
-
 /// Lamps that switch at once and remember when, by command or by the simulated camera's strobe. Refers to the clock.
 /// Thread-compatible.
-class SimLamps final : public LampArray, public StrobedLamps {
-=======
-/// Lamps that switch at once and remember when. Refers to the clock. Thread-compatible.
-class SimLamps final : public LampArray, public LampWitness {
->>>>>>> firmware
+class SimLamps final : public LampArray, public LampWitness, public StrobedLamps {
 public:
     SimLamps(std::size_t count, const SimClock& clock, FaultPlan faults = {});
     ~SimLamps() override;
@@ -38,10 +27,8 @@ public:
     void arm(const std::vector<StrobeStep>& program) override;
     std::vector<StrobeEvent> take_events() override;
 
-    /// The strobe line fell. Moments come in the order of time, and none after now.
-    void strobe(TimePoint moment);
-    /// Called before every command, to bring strobes up to date that fell before it.
-    void set_strobe_source(std::function<void()> catch_up) { catch_up_ = std::move(catch_up); }
+    void strobe(TimePoint moment) override;
+    void set_strobe_source(std::function<void()> catch_up) override { catch_up_ = std::move(catch_up); }
 
     std::vector<LampShare> burning_during(const Interval& interval) const override;
     /// How often light() and dark() were called.
@@ -50,32 +37,19 @@ public:
     bool all_dark() const { return history_.back().burning.empty(); }
 
 private:
-<<<<<<< HEAD
-    struct Switch {
-        TimePoint when;
-        std::vector<LampShare> burning;
-    };
-
     void check(LampId lamp, double level) const;
     void catch_up() const;
     void command(TimePoint when, std::vector<LampShare> commanded);
-=======
-    void command(std::vector<LampShare> commanded);
->>>>>>> firmware
     std::vector<LampShare> really_burning(std::vector<LampShare> commanded, std::uint64_t call) const;
 
     std::size_t count_;
     const SimClock& clock_;
     FaultPlan faults_;
-<<<<<<< HEAD
-    std::vector<Switch> history_;
+    std::vector<LampSwitch> history_;
     std::function<void()> catch_up_;
     std::vector<StrobeStep> program_;
     std::size_t next_step_ = 0;  ///< of the program; its size: none is left
     std::vector<StrobeEvent> events_;
-=======
-    std::vector<LampSwitch> history_;
->>>>>>> firmware
 };
 
 }  // namespace darkbox::sim

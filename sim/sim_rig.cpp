@@ -49,7 +49,7 @@ SimRig SimRig::make(const RigDescription& rig, const FaultPlan& faults) {
     options.queue_depth = rig.sim.queue_depth;
     options.faults = faults;
     if (!rig.sim.lamps_seen.empty()) result.seen_ = std::make_unique<SeenLamps>(rig);
-    const LampWitness& witness = result.seen_ ? static_cast<const LampWitness&>(*result.seen_) : *result.lamps_;
+    LampWitness& witness = result.seen_ ? static_cast<LampWitness&>(*result.seen_) : *result.lamps_;
     result.camera_ = std::make_unique<SimCamera>(*result.scene_, witness, *result.clock_, options);
     return result;
 }
