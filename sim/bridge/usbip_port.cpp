@@ -55,23 +55,18 @@ UsbIpPort::UsbIpPort(UsbFunction& function, Clock& clock, int port) : function_(
         throw_errno("write", attach_file, errno, "another device may be in that port");
 }
 
+bool UsbIpPort::wait_for_host(TimePoint until) {
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - clock_.now()).count();
+    pollfd wait{.fd = socket_.get(), .events = POLLIN, .revents = 0};
+    return !gone_ && ::poll(&wait, 1, static_cast<int>(std::clamp<std::int64_t>(left, 0, 60'000))) > 0;
+}
+
 void UsbIpPort::serve(TimePoint until) {
-    while (!gone_) {
-        const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - clock_.now()).count();
-        pollfd wait{.fd = socket_.get(), .events = POLLIN, .revents = 0};
-        const int ready = ::poll(&wait, 1, static_cast<int>(std::clamp<std::int64_t>(left, 0, 60'000)));
-        if (ready <= 0) return;
-        serve_one();
-    }
+    while (wait_for_host(until)) serve_one();
 }
 
 void UsbIpPort::serve_until_waiting(std::uint8_t endpoint, TimePoint until) {
-    while (!gone_ && !is_waiting(endpoint) && clock_.now() < until) {
-        pollfd wait{.fd = socket_.get(), .events = POLLIN, .revents = 0};
-        const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - clock_.now()).count();
-        if (::poll(&wait, 1, static_cast<int>(std::clamp<std::int64_t>(left, 0, 60'000))) <= 0) return;
-        serve_one();
-    }
+    while (!is_waiting(endpoint) && wait_for_host(until)) serve_one();
 }
 
 bool UsbIpPort::is_waiting(std::uint8_t endpoint) const {

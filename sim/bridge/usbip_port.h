@@ -38,6 +38,7 @@ private:
         std::uint32_t length = 0;
     };
 
+    bool wait_for_host(TimePoint until);
     void serve_one();
     void submit(const Header& header);
     void unlink(const Header& header);

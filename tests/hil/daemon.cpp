@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <chrono>
 #include <stdexcept>
 
 #include "tests/hil/machine.h"
@@ -45,14 +45,19 @@ void Daemon::start_capture(const std::string& object, const std::vector<std::str
 }
 
 Daemon::Json Daemon::ended() {
+    const auto limit = std::chrono::steady_clock::now() + std::chrono::seconds(200);
     Json end;
-    client_.follow_events(
-        0, {.event = [&](const Json& event) {
-            if (event.value("capture", std::uint64_t{0}) != capture_ || event.at("event") == "progress")
-                return DaemonClient::Follow::go_on;
-            end = event;
-            return DaemonClient::Follow::leave;
-        }});
+    const auto hear = [&](const Json& event) {
+        const std::string what = event.at("event");
+        if (event.value("job", std::uint64_t{0}) != capture_) return DaemonClient::Follow::go_on;
+        if (what != "done" && what != "failed" && what != "cancelled") return DaemonClient::Follow::go_on;
+        end = event;
+        return DaemonClient::Follow::leave;
+    };
+    const auto look_at_clock = [&] {
+        if (std::chrono::steady_clock::now() >= limit) throw std::runtime_error("the capture does not end: " + log());
+    };
+    client_.follow_events(0, {.event = hear, .idle = look_at_clock});
     return end;
 }
 
