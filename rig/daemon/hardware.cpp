@@ -8,6 +8,7 @@
 #include "acquisition/camera/v4l2_camera.h"
 #include "acquisition/device/device_error.h"
 #include "acquisition/frame/error.h"
+#include "rig/capture/timing_store.h"
 #include "rig/lamps/gpio_lamps.h"
 #include "sim/sim_rig.h"
 
@@ -27,6 +28,10 @@ V4l2Options v4l2_options(const CameraDescription& camera) {
     return options;
 }
 
+std::optional<MeasuredTiming> measured(const CameraInfo& camera) {
+    return stored_timing(default_timing_file(), camera);
+}
+
 class SimulatedRig final : public CaptureRig {
 public:
     explicit SimulatedRig(const RigDescription& rig) : rig_(rig), sim_(sim::SimRig::make(rig)) {}
@@ -34,13 +39,19 @@ public:
     CaptureOutcome capture(const CaptureRequest& request, const WorkContext& work) override {
         const auto start = Stopwatch::now();
         sim_ = sim::SimRig::make(rig_);  // its truth is of this capture alone
-        const auto [session, summary] = capture_session(request, rig_, sim_.lamps(), sim_.camera(), sim_.clock(), work);
+        const auto [session, summary] =
+            capture_session(request, rig_, sim_.lamps(), sim_.camera(), sim_.clock(), work, measured);
         write_truth(session.folder());
         return {.session = session.folder(),
                 .frames = session.frames().size(),
                 .resumed = summary.resumed,
                 .repeated = summary.repeated,
                 .duration = Stopwatch::now() - start};
+    }
+
+    void lend(const std::function<void(const CaptureDevices&)>& work) override {
+        const DarkOnExit dark_on_exit(sim_.lamps());
+        work({sim_.lamps(), sim_.camera(), sim_.clock()});
     }
 
     void dark() override { sim_.lamps().dark(); }
@@ -75,12 +86,17 @@ public:
 
     CaptureOutcome capture(const CaptureRequest& request, const WorkContext& work) override {
         const auto start = Stopwatch::now();
-        const auto [session, summary] = capture_session(request, rig_, *lamps_, camera_, clock_, work);
+        const auto [session, summary] = capture_session(request, rig_, *lamps_, camera_, clock_, work, measured);
         return {.session = session.folder(),
                 .frames = session.frames().size(),
                 .resumed = summary.resumed,
                 .repeated = summary.repeated,
                 .duration = Stopwatch::now() - start};
+    }
+
+    void lend(const std::function<void(const CaptureDevices&)>& work) override {
+        const DarkOnExit dark_on_exit(*lamps_);
+        work({*lamps_, camera_, clock_});
     }
 
     void dark() override { lamps_->dark(); }
