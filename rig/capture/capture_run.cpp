@@ -53,13 +53,13 @@ void validate(const CapturePlan& plan, const RigDescription& rig, const LampArra
 class Run {
 public:
     Run(const CapturePlan& plan, const RigDescription& rig, const CaptureDevices& devices, FrameSink& sink,
-        const WorkContext& work, const std::optional<MeasuredTiming>& measured)
+        const WorkContext& work, const TimingLookup& timings)
         : plan_(plan),
           rig_(rig),
           clock_(devices.clock),
           sink_(sink),
           work_(work),
-          source_(devices.camera, devices.clock, plan.shots.front().camera, work, measured),
+          source_(devices.camera, devices.clock, plan.shots.front().camera, work, timings),
           lamps_(devices.lamps, devices.clock, rig),
           check_(source_.info(), rig.capture),
           settled_(rig, lamps_, source_, check_, devices.clock) {}
@@ -265,11 +265,11 @@ private:
 }  // namespace
 
 CaptureSummary run_capture(const CapturePlan& plan, const RigDescription& rig, const CaptureDevices& devices,
-                           FrameSink& sink, const WorkContext& work, const std::optional<MeasuredTiming>& measured) {
+                           FrameSink& sink, const WorkContext& work, const TimingLookup& timings) {
     validate(plan, rig, devices.lamps);
     if (plan.closing_dark_differs_is_error) refuse_doubtful(sink);
     devices.lamps.dark();
-    return Run(plan, rig, devices, sink, work, measured).all();
+    return Run(plan, rig, devices, sink, work, timings).all();
 }
 
 }  // namespace darkbox

@@ -8,8 +8,8 @@
 #include "acquisition/camera/camera.h"
 #include "acquisition/device/clock.h"
 #include "acquisition/frame/progress.h"
-#include "rig/capture/exposure_clock.h"
 #include "rig/capture/frame_sink.h"
+#include "rig/capture/frame_source.h"
 #include "rig/capture/taken_shot.h"
 #include "rig/description/rig_description.h"
 #include "rig/lamps/lamp_array.h"
@@ -41,10 +41,9 @@ struct CaptureDevices {
 /// Takes every shot of the plan that the sink does not hold yet, at the speed that rig.capture.mode asks for. Each
 /// frame is proven to be lit by its lamp before it goes to the sink: by its timestamps against the lamp's steady
 /// interval, then by the picture (see picture_check.h, switch_witness.h). Lamps are dark when it returns or throws.
-/// `measured`: where exposures lie beside their timestamps, when that was measured.
+/// `timings`: where exposures lie beside their timestamps, where that was measured.
 /// Throws Cancelled, DeviceError, or InputError naming lamp, frame and cause.
 CaptureSummary run_capture(const CapturePlan& plan, const RigDescription& rig, const CaptureDevices& devices,
-                           FrameSink& sink, const WorkContext& work = {},
-                           const std::optional<MeasuredTiming>& measured = std::nullopt);
+                           FrameSink& sink, const WorkContext& work = {}, const TimingLookup& timings = {});
 
 }  // namespace darkbox

@@ -112,8 +112,7 @@ SessionInfo session_info(const RigDescription& rig, const CameraInfo& camera, co
 }
 
 CapturedSession capture_session(const CaptureRequest& request, const RigDescription& description, LampArray& lamps,
-                                Camera& camera, Clock& clock, const WorkContext& work,
-                                const std::optional<MeasuredTiming>& measured) {
+                                Camera& camera, Clock& clock, const WorkContext& work, const TimingLookup& timings) {
     const DarkOnExit dark_on_exit(lamps);
     RigDescription rig = description;
     rig.capture.mode = request.mode.value_or(rig.capture.mode);
@@ -121,7 +120,7 @@ CapturedSession capture_session(const CaptureRequest& request, const RigDescript
     CaptureSummary summary;
     {
         SessionRecorder recorder(begun.writer);
-        summary = run_capture(begun.plan, rig, {lamps, camera, clock}, recorder, work, measured);
+        summary = run_capture(begun.plan, rig, {lamps, camera, clock}, recorder, work, timings);
         recorder.finish();
     }
     return {begun.writer.seal(), summary};

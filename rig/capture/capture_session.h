@@ -38,6 +38,6 @@ SessionInfo session_info(const RigDescription& rig, const CameraInfo& camera, co
 /// InputError when an interrupted session was begun with another rig.toml or other lamps.
 CapturedSession capture_session(const CaptureRequest& request, const RigDescription& rig, LampArray& lamps,
                                 Camera& camera, Clock& clock, const WorkContext& work = {},
-                                const std::optional<MeasuredTiming>& measured = std::nullopt);
+                                const TimingLookup& timings = {});
 
 }  // namespace darkbox

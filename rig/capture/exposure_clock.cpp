@@ -79,8 +79,7 @@ void ExposureClock::fit() {
 
 Nanoseconds ExposureClock::margin() const {
     // Few stamps may all be late by chance; many show how late they get.
-    const double few =
-        1.0 + static_cast<double>(wanted_places) / static_cast<double>(std::max<std::size_t>(places_.size(), 1));
+    const double few = 1.2 + 12.0 / static_cast<double>(std::max<std::size_t>(places_.size(), 1));
     return rounded(few * worst_off_ + least_margin_ns) + (measured_ ? measured_->margin : Nanoseconds(0));
 }
 
@@ -89,11 +88,15 @@ Interval ExposureClock::exposure_of(const Frame& frame) const {
     return {frame.timestamp + measured_->begin_from_stamp, frame.timestamp + measured_->end_from_stamp};
 }
 
-Interval ExposureClock::predicted(std::uint64_t sequence) const {
+TimePoint ExposureClock::stamp(std::uint64_t sequence) const {
     const double frames = static_cast<double>(sequence) - static_cast<double>(origin_.sequence);
-    const TimePoint stamp = origin_.stamp + rounded(offset_ + period_ * frames);
-    return {stamp + (measured_ ? measured_->begin_from_stamp : begin_from_stamp_),
-            stamp + (measured_ ? measured_->end_from_stamp : end_from_stamp_)};
+    return origin_.stamp + rounded(offset_ + period_ * frames);
+}
+
+Interval ExposureClock::predicted(std::uint64_t sequence) const {
+    const TimePoint stamped = stamp(sequence);
+    return {stamped + (measured_ ? measured_->begin_from_stamp : begin_from_stamp_),
+            stamped + (measured_ ? measured_->end_from_stamp : end_from_stamp_)};
 }
 
 std::uint64_t ExposureClock::first_from(TimePoint moment) const {

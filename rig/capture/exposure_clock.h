@@ -13,7 +13,8 @@ namespace darkbox {
 struct MeasuredTiming {
     Nanoseconds begin_from_stamp{0};
     Nanoseconds end_from_stamp{0};
-    Nanoseconds margin{0};  ///< how far off these two may be
+    Nanoseconds readout{0};  ///< from the first row's end to the last row's
+    Nanoseconds margin{0};   ///< how far off these may be
 };
 
 /// The rhythm of a free-running camera, learned from its timestamps: a straight line through the latest frames' numbers
@@ -37,7 +38,9 @@ public:
 
     /// First row's begin to last row's end by the frame's own stamp, as measured where it was, else as the driver says.
     Interval exposure_of(const Frame& frame) const;
-    /// The same by the rhythm; must be locked.
+    /// The stamp of a frame by the rhythm; must be locked.
+    TimePoint stamp(std::uint64_t sequence) const;
+    /// The exposure by the rhythm; must be locked.
     Interval predicted(std::uint64_t sequence) const;
     /// The first frame whose predicted exposure begins at `moment` or later; must be locked.
     std::uint64_t first_from(TimePoint moment) const;

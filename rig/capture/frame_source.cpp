@@ -59,8 +59,14 @@ void check_frame(const Frame& frame, const CameraInfo& camera) {
 }
 
 FrameSource::FrameSource(Camera& camera, Clock& clock, const CameraConfig& config, const WorkContext& work,
-                         const std::optional<MeasuredTiming>& measured)
-    : camera_(camera), clock_(clock), work_(work), info_(camera.configure(config)), rhythm_(info_, measured) {
+                         const TimingLookup& timings)
+    : camera_(camera),
+      clock_(clock),
+      work_(work),
+      info_(camera.configure(config)),
+      measured_(timings ? timings(info_) : std::nullopt),
+      rhythm_(info_, measured_) {
+    if (measured_) info_.readout = Seconds(measured_->readout);
     camera_.start();
 }
 

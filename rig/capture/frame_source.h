@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <optional>
 #include <utility>
 
@@ -19,13 +20,16 @@ public:
     using DeviceError::DeviceError;
 };
 
+/// What was measured of a camera as it is set up; none where nothing was. May be empty.
+using TimingLookup = std::function<std::optional<MeasuredTiming>(const CameraInfo&)>;
+
 /// Frames of one run, in order and undamaged, with a way out while a camera hangs. Stops the camera when it goes.
 /// Thread-compatible.
 class FrameSource {
 public:
     /// Configures and starts the camera. All references must outlive this. Throws DeviceError.
     FrameSource(Camera& camera, Clock& clock, const CameraConfig& config, const WorkContext& work,
-                const std::optional<MeasuredTiming>& measured = std::nullopt);
+                const TimingLookup& timings = {});
     FrameSource(const FrameSource&) = delete;
     FrameSource& operator=(const FrameSource&) = delete;
     ~FrameSource();
@@ -84,6 +88,7 @@ private:
     Clock& clock_;
     const WorkContext& work_;
     CameraInfo info_;
+    std::optional<MeasuredTiming> measured_;
     ExposureClock rhythm_;
     bool in_rhythm_ = true;
     std::deque<std::pair<std::uint64_t, std::uint64_t>> pictures_;  ///< sequence and hash of the latest

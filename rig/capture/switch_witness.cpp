@@ -1,5 +1,6 @@
 #include "rig/capture/switch_witness.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
@@ -16,6 +17,9 @@ constexpr double clear = 4.5;
 /// A part of the light that a lie of just over the tolerance changes by more than the tolerance and its noise.
 constexpr double telling = 1.3;
 
+/// How much of the normal equations must be light and not noise.
+constexpr double least_clean = 0.5;
+
 struct Shares {
     double before = 0.0;
     double after = 0.0;
@@ -24,44 +28,69 @@ struct Shares {
     bool solved = false;
 };
 
-/// Least squares over a band: spoiled = before's share of one light + after's share of the other.
+/// What the pictures hold at one sample, without the dark.
+struct Sample {
+    double before = 0.0;
+    double after = 0.0;
+    double spoiled = 0.0;
+};
+
+/// Least squares over a band: spoiled = before's share of one light + after's share of the other. The two lights are
+/// noisy themselves, and all three have the dark frame's noise in common; what that adds to the normal equations is
+/// known and taken off (Fuller, "Measurement Error Models", 1987, section 2.2). Without that, rows in which there is
+/// little light, or two lights are alike, would seem to hold some of each.
 class BandFit {
 public:
-    void add(double before, double after, double spoiled, double variance) {
-        bb_ += before * before / variance;
-        aa_ += after * after / variance;
-        ab_ += before * after / variance;
-        bs_ += before * spoiled / variance;
-        as_ += after * spoiled / variance;
+    explicit BandFit(const NoiseModel& noise) : noise_(noise) {}
+
+    void add(const Sample& s) {
+        // Of the spoiled frame, and of the light that it is compared with.
+        const double weight = 1 / (2 * noise_.variance(std::max({s.before, s.after, s.spoiled})));
+        const double dark = weight * noise_.variance(0);
+        raw_ += weight *
+                Eigen::Matrix2d{{s.before * s.before, s.before * s.after}, {s.before * s.after, s.after * s.after}};
+        noisy_ += Eigen::Matrix2d{{weight * noise_.variance(s.before) + dark, dark},
+                                  {dark, weight * noise_.variance(s.after) + dark}};
+        right_ += weight * s.spoiled * Eigen::Vector2d(s.before, s.after) - Eigen::Vector2d(dark, dark);
     }
 
-    /// Lights that look alike cannot be told apart: not solved.
-    Shares solve() const {
+    /// One light alone; the other share is 0.
+    Shares solve_one(int light) const {
         Shares shares;
-        if (bb_ <= 0 || aa_ <= 0) {
-            const double own = std::max(bb_, aa_);
-            if (own <= 0) return shares;
-            (bb_ > 0 ? shares.before : shares.after) = (bb_ > 0 ? bs_ : as_) / own;
-            (bb_ > 0 ? shares.before_sigma : shares.after_sigma) = 1 / std::sqrt(own);
-            shares.solved = true;
+        const double raw = raw_(light, light), clean = raw - noisy_(light, light);
+        if (clean < least_clean * raw || raw <= 0) return shares;
+        (light == 0 ? shares.before : shares.after) = right_(light) / clean;
+        (light == 0 ? shares.before_sigma : shares.after_sigma) = std::sqrt(raw) / clean;
+        shares.solved = true;
+        return shares;
+    }
+
+    /// Lights that noise alone could tell apart cannot be: not solved.
+    Shares solve_both() const {
+        Shares shares;
+        const Eigen::Matrix2d clean = raw_ - noisy_;
+        if (raw_.determinant() <= 0 || clean(0, 0) <= 0 || clean.determinant() < least_clean * raw_.determinant())
             return shares;
-        }
-        const double determinant = bb_ * aa_ - ab_ * ab_;
-        if (determinant <= 1e-9 * bb_ * aa_) return shares;
-        shares.before = (bs_ * aa_ - as_ * ab_) / determinant;
-        shares.after = (as_ * bb_ - bs_ * ab_) / determinant;
-        shares.before_sigma = std::sqrt(aa_ / determinant);
-        shares.after_sigma = std::sqrt(bb_ / determinant);
+        const Eigen::Matrix2d inverse = clean.inverse();
+        const Eigen::Vector2d solution = inverse * right_;
+        const Eigen::Matrix2d covariance = inverse * raw_ * inverse;
+        shares.before = solution(0);
+        shares.after = solution(1);
+        shares.before_sigma = std::sqrt(covariance(0, 0));
+        shares.after_sigma = std::sqrt(covariance(1, 1));
         shares.solved = true;
         return shares;
     }
 
 private:
-    double bb_ = 0, aa_ = 0, ab_ = 0, bs_ = 0, as_ = 0;
+    const NoiseModel& noise_;
+    Eigen::Matrix2d raw_ = Eigen::Matrix2d::Zero();
+    Eigen::Matrix2d noisy_ = Eigen::Matrix2d::Zero();  ///< what noise is expected to have added to it
+    Eigen::Vector2d right_ = Eigen::Vector2d::Zero();
 };
 
 Shares shares_of_rows(const WitnessPictures& p, const NoiseModel& noise, double full_scale, int first, int last) {
-    BandFit fit;
+    BandFit fit(noise);
     const auto columns = static_cast<std::size_t>(p.dark->columns);
     for (std::size_t i = static_cast<std::size_t>(first) * columns; i < static_cast<std::size_t>(last) * columns; ++i) {
         const auto light = [&](const Picture* picture) {
@@ -70,11 +99,10 @@ Shares shares_of_rows(const WitnessPictures& p, const NoiseModel& noise, double 
         const bool clipped = (p.before && p.before->samples[i] >= full_scale) ||
                              (p.after && p.after->samples[i] >= full_scale) || p.spoiled->samples[i] >= full_scale;
         if (clipped) continue;
-        const double before = light(p.before), after = light(p.after), spoiled = light(p.spoiled);
-        // Noise of the spoiled frame, and of the two it is compared with; all have the dark frame's as well.
-        fit.add(before, after, spoiled, 2 * noise.variance(std::max({before, after, spoiled})));
+        fit.add({light(p.before), light(p.after), light(p.spoiled)});
     }
-    return fit.solve();
+    if (p.before && p.after) return fit.solve_both();
+    return fit.solve_one(p.before ? 0 : 1);
 }
 
 /// What a band is expected to hold. Rows of a rolling shutter change from one to the next: `blur` is how much that may
@@ -132,6 +160,19 @@ BandLights compare_bands(const WitnessPictures& pictures, const NoiseModel& nois
         lights.most_missing = std::max(lights.most_missing, std::abs(1 - seen.after) - clear * seen.after_sigma);
     }
     return lights;
+}
+
+std::vector<BandShare> band_shares(const WitnessPictures& pictures, const NoiseModel& noise, double full_scale) {
+    std::vector<BandShare> shares;
+    const int rows = pictures.dark->rows;
+    const int bands = std::min(most_bands, rows);
+    for (int band = 0; band < bands; ++band) {
+        const int first = rows * band / bands, last = rows * (band + 1) / bands;
+        const Shares seen = shares_of_rows(pictures, noise, full_scale, first, last);
+        const double height = rows > 1 ? (first + last - 1) / 2.0 / (rows - 1) : 0.0;
+        if (seen.solved) shares.push_back({height, seen.after, seen.after_sigma});
+    }
+    return shares;
 }
 
 }  // namespace darkbox

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <functional>
-#include <optional>
+#include <vector>
 
 #include "rig/capture/picture.h"
 
@@ -50,5 +50,13 @@ struct BandLights {
     double most_missing = 0.0;  ///< share of after's light, too much of it counted as well
 };
 BandLights compare_bands(const WitnessPictures& pictures, const NoiseModel& noise, double full_scale);
+
+/// How much of after's light a band of rows holds; `pictures.before` is null. Bands that cannot tell are left out.
+struct BandShare {
+    double height = 0.0;  ///< of the band's middle: 0 = first row, 1 = last
+    double share = 0.0;
+    double sigma = 0.0;
+};
+std::vector<BandShare> band_shares(const WitnessPictures& pictures, const NoiseModel& noise, double full_scale);
 
 }  // namespace darkbox

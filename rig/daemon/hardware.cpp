@@ -8,6 +8,7 @@
 #include "acquisition/camera/v4l2_camera.h"
 #include "acquisition/device/device_error.h"
 #include "acquisition/frame/error.h"
+#include "rig/capture/timing_store.h"
 #include "rig/lamps/gpio_lamps.h"
 #include "rig/lamps/usb_lamps.h"
 #include "sim/sim_rig.h"
@@ -28,6 +29,10 @@ V4l2Options v4l2_options(const CameraDescription& camera) {
     return options;
 }
 
+std::optional<MeasuredTiming> measured(const CameraInfo& camera) {
+    return stored_timing(default_timing_file(), camera);
+}
+
 /// Its camera sees simulated lamps, or those of an emulated board, which are driven as real ones.
 class SimulatedRig final : public CaptureRig {
 public:
@@ -37,13 +42,19 @@ public:
     CaptureOutcome capture(const CaptureRequest& request, const WorkContext& work) override {
         const auto start = Stopwatch::now();
         sim_ = sim::SimRig::make(rig_);  // its truth is of this capture alone
-        const auto [session, summary] = capture_session(request, rig_, lamps(), sim_.camera(), sim_.clock(), work);
+        const auto [session, summary] =
+            capture_session(request, rig_, lamps(), sim_.camera(), sim_.clock(), work, measured);
         write_truth(session.folder());
         return {.session = session.folder(),
                 .frames = session.frames().size(),
                 .resumed = summary.resumed,
                 .repeated = summary.repeated,
                 .duration = Stopwatch::now() - start};
+    }
+
+    void lend(const std::function<void(const CaptureDevices&)>& work) override {
+        const DarkOnExit dark_on_exit(lamps());
+        work({lamps(), sim_.camera(), sim_.clock()});
     }
 
     void dark() override { lamps().dark(); }
@@ -81,12 +92,17 @@ public:
 
     CaptureOutcome capture(const CaptureRequest& request, const WorkContext& work) override {
         const auto start = Stopwatch::now();
-        const auto [session, summary] = capture_session(request, rig_, *lamps_, camera_, clock_, work);
+        const auto [session, summary] = capture_session(request, rig_, *lamps_, camera_, clock_, work, measured);
         return {.session = session.folder(),
                 .frames = session.frames().size(),
                 .resumed = summary.resumed,
                 .repeated = summary.repeated,
                 .duration = Stopwatch::now() - start};
+    }
+
+    void lend(const std::function<void(const CaptureDevices&)>& work) override {
+        const DarkOnExit dark_on_exit(*lamps_);
+        work({*lamps_, camera_, clock_});
     }
 
     void dark() override { lamps_->dark(); }

@@ -89,6 +89,7 @@ public:
     };
     /// What really shone during the interval, as shares of it.
     std::vector<Share> shares(const Interval& interval) const;
+    bool lit() const { return lit_.has_value(); }
     TimePoint first_lit() const { return first_lit_; }
     TimePoint last_lit() const { return last_lit_; }
 

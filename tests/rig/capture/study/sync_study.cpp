@@ -54,6 +54,15 @@ private:
     std::vector<FrameRecord> kept_;
 };
 
+/// What the mode promises: lights a frame period.
+double promise(const StudyCase& c, SyncMode mode) { return mode == SyncMode::settled ? 1.0 / (2 + c.latency) : 1.0; }
+
+double percent(std::size_t part, std::size_t whole) {
+    return whole == 0 ? 0.0 : 100.0 * static_cast<double>(part) / static_cast<double>(whole);
+}
+
+}  // namespace
+
 RigDescription rig_of(const StudyCase& c, SyncMode mode) {
     RigDescription rig;
     rig.name = "study";
@@ -68,15 +77,6 @@ RigDescription rig_of(const StudyCase& c, SyncMode mode) {
     }
     return rig;
 }
-
-/// What the mode promises: lights a frame period.
-double promise(const StudyCase& c, SyncMode mode) { return mode == SyncMode::settled ? 1.0 / (2 + c.latency) : 1.0; }
-
-double percent(std::size_t part, std::size_t whole) {
-    return whole == 0 ? 0.0 : 100.0 * static_cast<double>(part) / static_cast<double>(whole);
-}
-
-}  // namespace
 
 double StudyTally::at_the_aim(SyncMode mode) const {
     const double aim = mode == SyncMode::settled ? 0.90 : 0.95;
@@ -116,7 +116,7 @@ StudyCase draw_case(std::uint64_t seed, Lie lie) {
     return c;
 }
 
-StudyTally study_session(const StudyCase& c, SyncMode mode) {
+StudyTally study_session(const StudyCase& c, SyncMode mode, const TimingLookup& timings) {
     StudyTally tally;
     tally.sessions = 1;
     StudyClock clock;
@@ -126,7 +126,7 @@ StudyTally study_session(const StudyCase& c, SyncMode mode) {
     const RigDescription rig = rig_of(c, mode);
     const CapturePlan plan = plan_capture(rig);
     try {
-        const CaptureSummary summary = run_capture(plan, rig, {lamp_array, camera, clock}, sink);
+        const CaptureSummary summary = run_capture(plan, rig, {lamp_array, camera, clock}, sink, {}, timings);
         tally.rejected = static_cast<std::size_t>(summary.repeated);
         const double periods = to_seconds(lamp_array.last_lit() - lamp_array.first_lit()) / c.period;
         if (!sink.unfit) tally.speed.push_back(static_cast<double>(c.lamps) / periods / promise(c, mode));

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "rig/capture/frame_source.h"
 #include "rig/description/rig_description.h"
 #include "tests/rig/capture/study/study_rig.h"
 
@@ -37,8 +38,10 @@ struct StudyTally {
 /// 1 to 8, jitter, rolling or global shutter.
 StudyCase draw_case(std::uint64_t seed, Lie lie);
 
+RigDescription rig_of(const StudyCase& c, SyncMode mode);
+
 /// One session through run_capture(): dark, 64 lamps, dark.
-StudyTally study_session(const StudyCase& c, SyncMode mode);
+StudyTally study_session(const StudyCase& c, SyncMode mode, const TimingLookup& timings = {});
 
 struct StudyRow {
     SyncMode mode = SyncMode::settled;
