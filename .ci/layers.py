@@ -14,9 +14,10 @@ PROCESSING = [
     {"processing/maps"}, {"processing/calibration"}, {"processing/normals"}, {"processing/shading", "processing/texels"},
     {"processing/relight", "processing/transfer"}, {"processing/formats"}, {"processing/pipeline"},
 ]
+FIRMWARE = [{"firmware/protocol"}, {"firmware/lampctl"}, {"firmware/board/atmega32u4", "firmware/board/host"}]
 ROOTS = [{"sim"}, {"rig/daemon"}, {"rig/cli"}]  # may include both columns
 BRIDGES = {("processing/pipeline", "acquisition/session")}
-FOLDERS = set().union(*CAPTURE, *PROCESSING, *ROOTS)
+FOLDERS = set().union(*CAPTURE, *PROCESSING, *FIRMWARE, *ROOTS)
 
 INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
 
@@ -38,7 +39,7 @@ def allowed(source, target):
         return target_line is None or target_line < root_line
     if source.startswith("processing/") and target == "acquisition/frame":
         return True
-    for column in (CAPTURE, PROCESSING):
+    for column in (CAPTURE, PROCESSING, FIRMWARE):
         source_line, target_line = line_of(column, source), line_of(column, target)
         if source_line is not None and target_line is not None:
             return target_line < source_line

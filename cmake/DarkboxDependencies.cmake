@@ -8,6 +8,8 @@ if(CMAKE_CXX_FLAGS MATCHES "-fsanitize=address")
   # Under this sanitizer Eigen takes malloc's memory otherwise than the Ceres library does that was built without it, and
   # one would free what the other took. The sanitizer's malloc is aligned as well.
   add_compile_definitions(EIGEN_MALLOC_ALREADY_ALIGNED=1)
+  # GCC 12 then also warns of values "never set" inside the standard library's own optional and regex.
+  add_compile_options(-Wno-maybe-uninitialized)
 endif()
 find_package(TBB REQUIRED)
 find_package(TIFF REQUIRED)
@@ -19,6 +21,8 @@ find_package(fmt REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(Boost 1.74 REQUIRED)
 find_package(GTest REQUIRED)
+find_package(SQLite3 REQUIRED)
+find_package(SQLiteCpp REQUIRED)
 find_package(OpenSSL REQUIRED COMPONENTS Crypto)
 pkg_check_modules(TOMLPLUSPLUS REQUIRED IMPORTED_TARGET tomlplusplus)
 pkg_check_modules(SYSTEMD REQUIRED IMPORTED_TARGET libsystemd)

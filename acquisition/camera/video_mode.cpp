@@ -124,6 +124,9 @@ SensorLayout agree_on_layout(VideoNode& node, const V4l2Options& options) {
     return layout;
 }
 
+/// ENODATA: other inputs of the same device can crop.
+bool means_cannot(int error) { return error == EINVAL || error == ENOTTY || error == ENODATA; }
+
 void agree_on_crop(VideoNode& node, const V4l2Options& options) {
     v4l2_selection selection{};
     selection.type = capture;
@@ -140,8 +143,8 @@ void agree_on_crop(VideoNode& node, const V4l2Options& options) {
     if (error == 0 && selection.r.left == asked.left && selection.r.top == asked.top &&
         selection.r.width == asked.width && selection.r.height == asked.height)
         return;
-    if (!options.crop && (error == EINVAL || error == ENOTTY)) return;
-    if (error != 0 && error != EINVAL && error != ENOTTY) node.fail(set_selection.name, error);
+    if (!options.crop && means_cannot(error)) return;
+    if (error != 0 && !means_cannot(error)) node.fail(set_selection.name, error);
     throw InputError(fmt::format("crop is [{}, {}, {}, {}], which {} cannot do{}", asked.left, asked.top, asked.width,
                                  asked.height, node.path(),
                                  error == 0 ? fmt::format("; nearest: [{}, {}, {}, {}]", selection.r.left,

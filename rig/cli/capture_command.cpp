@@ -117,7 +117,7 @@ private:
 
     DaemonClient::Follow hear(const EventJson& event) {
         cancel_if_asked();
-        if (event.value("capture", std::uint64_t{0}) != id_) return DaemonClient::Follow::go_on;
+        if (event.value("job", std::uint64_t{0}) != id_) return DaemonClient::Follow::go_on;
         if (event.at("event") == "progress") {
             work_.tell({event.at("stage"), event.at("done"), event.at("total"), event.at("detail")});
             return DaemonClient::Follow::go_on;
@@ -129,7 +129,7 @@ private:
     void cancel_if_asked() {
         if (!work_.cancelled() || asked_) return;
         asked_ = true;
-        client_.call("DELETE", fmt::format("captures/{}", id_));
+        client_.call("DELETE", fmt::format("jobs/{}", id_));
     }
 
     const DaemonClient& client_;

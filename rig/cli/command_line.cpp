@@ -44,6 +44,12 @@ void print_error(const std::string& what, const std::string& hint) {
 
 std::string printed(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace); }
 
+/// What darkboxd reads of the commands it runs.
+void put_progress(const ProgressUpdate& update) {
+    const Json json{{"stage", update.stage}, {"done", update.done}, {"total", update.total}, {"detail", update.detail}};
+    put("progress " + json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
 void print_warning(const std::string& warning) {
     const bool colour = ::isatty(STDERR_FILENO) != 0;
     const auto style = colour ? fmt::text_style(fmt::fg(fmt::terminal_color::yellow)) : fmt::text_style();
@@ -65,6 +71,7 @@ CLI::App& CommandLine::add(const std::string& name, const std::string& descripti
     CLI::App& command = *(parent != nullptr ? parent : &app_)->add_subcommand(name, description);
     command.add_flag("--json", json_, "Print one JSON object on stdout");
     command.add_flag("--strict", strict_, "Exit with status 3 when there were warnings");
+    command.add_flag("--progress-lines", progress_lines_, "Tell progress as lines of JSON on stderr")->group("");
     command.add_option("--threads", threads_, "Threads to use; 0 = all cores")->check(CLI::Range(0, 1024));
     command.footer("Example:\n  " + example);
     command.callback([this, body = std::move(body)] { chosen_ = body; });
@@ -118,6 +125,7 @@ int CommandLine::parse_and_run(int argc, char** argv) {
     ProgressBar bar;
     WorkContext work;
     work.report = [&bar](const ProgressUpdate& update) { bar.show(update); };
+    if (progress_lines_) work.report = put_progress;
     work.stop = interrupt.token();
     work.threads = threads_;
 

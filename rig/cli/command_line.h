@@ -56,6 +56,7 @@ private:
     std::optional<Body> chosen_;
     bool json_ = false;
     bool strict_ = false;
+    bool progress_lines_ = false;
     int threads_ = 0;
 };
 

@@ -3,37 +3,24 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <charconv>
-#include <initializer_list>
-#include <string_view>
+#include <algorithm>
 
 #include "acquisition/frame/error.h"
-#include "rig/daemon/capture_order_json.h"
-#include "rig/daemon/session_folder.h"
+#include "rig/daemon/api_words.h"
 
 namespace darkbox {
 namespace {
 
-using Json = nlohmann::json;
-
 constexpr std::string_view prefix = "/api/v1/";
-
-/// The request does not fit the API: an HTTP status other than 400.
-struct Rejected {
-    int status;
-    std::string detail;
-    std::string hint;
-    std::string allow = {};
-};
-
-std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
-
-ApiResponse reply(const Json& json, int status = 200) { return {.status = status, .body = dump(json) + "\n"}; }
 
 std::string_view title(int status) {
     switch (status) {
         case 400:
             return "Bad Request";
+        case 401:
+            return "Unauthorized";
+        case 403:
+            return "Forbidden";
         case 404:
             return "Not Found";
         case 405:
@@ -44,152 +31,185 @@ std::string_view title(int status) {
             return "Payload Too Large";
         case 415:
             return "Unsupported Media Type";
+        case 416:
+            return "Range Not Satisfiable";
+        case 421:
+            return "Misdirected Request";
+        case 429:
+            return "Too Many Requests";
         case 431:
             return "Request Header Fields Too Large";
         case 503:
             return "Service Unavailable";
+        case 507:
+            return "Insufficient Storage";
         default:
             return "Internal Server Error";
     }
 }
 
-void need_method(const ApiRequest& request, std::initializer_list<std::string_view> allowed) {
-    for (const std::string_view method : allowed)
-        if (request.method == method) return;
-    const std::string list = fmt::format("{}", fmt::join(allowed, ", "));
-    throw Rejected{405, fmt::format("{} is not what this address takes", request.method.substr(0, 20)), "use " + list,
-                   list};
-}
-
-void need_json(const ApiRequest& request) {
-    const std::string type = request.content_type.substr(0, request.content_type.find(';'));
-    if (type != "application/json")
-        throw Rejected{415, "the body is not application/json", "send Content-Type: application/json"};
-}
-
-std::uint64_t number(std::string_view text, const std::string& what) {
-    std::uint64_t value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size())
-        throw InputError(fmt::format("{} is not a number", what), "use digits only");
-    return value;
-}
-
-/// Of "after=12"; 0 without a query.
-std::uint64_t events_after(std::string_view query) {
-    constexpr std::string_view key = "after=";
-    if (query.empty()) return 0;
-    if (!query.starts_with(key)) throw InputError("unknown query", "known: after=NUMBER");
-    return number(query.substr(key.size()), "after");
-}
-
 [[noreturn]] void no_such_address() {
-    throw Rejected{404, "there is nothing at this address", "see GET /api/v1/status"};
+    throw Rejected{404, "there is nothing at this address", "see GET /api/v1/openapi.json"};
 }
 
-Json describe(const SessionListing& session) {
-    Json json{{"name", session.name}, {"state", name(session.state)}, {"frames", session.frames}};
-    if (!session.object.empty()) json["object"] = session.object;
-    if (!session.created.empty()) json["created"] = session.created;
-    if (!session.problem.empty()) json["problem"] = session.problem;
-    return json;
+std::vector<std::string_view> split(std::string_view text, char at) {
+    std::vector<std::string_view> parts;
+    while (true) {
+        const auto end = text.find(at);
+        parts.push_back(text.substr(0, end));
+        if (end == text.npos) return parts;
+        text.remove_prefix(end + 1);
+    }
+}
+
+/// "%2e" becomes "."; throws InputError for what is not two hexadecimal digits.
+std::string decoded(std::string_view text) {
+    const auto digit = [](char c) {
+        if (c >= '0' && c <= '9') return c - '0';
+        if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+        if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+        throw InputError("the address has a broken percent sign", "write %25 for a percent sign");
+    };
+    std::string result;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        if (text[i] != '%') {
+            result += text[i];
+            continue;
+        }
+        if (i + 2 >= text.size()) throw InputError("the address has a broken percent sign", "write %25 for it");
+        result += static_cast<char>(digit(text[i + 1]) * 16 + digit(text[i + 2]));
+        i += 2;
+    }
+    return result;
+}
+
+/// What stands for {name} in the template, when the address fits it.
+std::optional<std::map<std::string, std::string>> match(std::string_view pattern, std::string_view address) {
+    std::map<std::string, std::string> parts;
+    const auto wanted = split(pattern, '/');
+    const auto given = split(address, '/');
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+        if (i >= given.size()) return std::nullopt;
+        if (wanted[i] == "{path}") {
+            const auto start = static_cast<std::size_t>(given[i].data() - address.data());
+            parts["path"] = decoded(address.substr(start));
+            return parts;
+        }
+        const bool variable = wanted[i].starts_with('{');
+        if (variable) {
+            parts[std::string(wanted[i].substr(1, wanted[i].size() - 2))] = decoded(given[i]);
+        } else if (wanted[i] != given[i]) {
+            return std::nullopt;
+        }
+    }
+    if (given.size() != wanted.size()) return std::nullopt;
+    return parts;
+}
+
+std::map<std::string, std::string> parse_query(std::string_view query, const std::vector<std::string_view>& known) {
+    std::map<std::string, std::string> values;
+    if (query.empty()) return values;
+    for (const std::string_view pair : split(query, '&')) {
+        const auto equals = pair.find('=');
+        const std::string_view key = pair.substr(0, equals);
+        if (std::ranges::find(known, key) == known.end() || equals == pair.npos)
+            throw InputError("unknown query", known.empty() ? std::string("leave out what follows the question mark")
+                                                            : fmt::format("known: {}", fmt::join(known, ", ")));
+        values[std::string(key)] = decoded(pair.substr(equals + 1));
+    }
+    return values;
 }
 
 }  // namespace
 
 ApiResponse problem(int status, const std::string& detail, const std::string& hint) {
-    return {.status = status,
-            .content_type = "application/problem+json",
-            .body = dump({{"type", "about:blank"},
-                          {"title", title(status)},
-                          {"status", status},
-                          {"detail", detail},
-                          {"hint", hint}}) +
-                    "\n"};
+    ApiResponse response = reply(
+        {{"type", "about:blank"}, {"title", title(status)}, {"status", status}, {"detail", detail}, {"hint", hint}},
+        status);
+    response.content_type = "application/problem+json";
+    return response;
+}
+
+Api::Api(const RigDescription& rig, Service& service, Metrics& metrics)
+    : rig_(rig), service_(service), metrics_(metrics) {}
+
+const std::vector<Api::Route>& Api::table() {
+    static const std::vector<Route> routes{
+        {"GET", "status", {}, &Api::status},
+        {"GET", "lamps", {}, &Api::lamps},
+        {"POST", "lamps/dark", {}, &Api::darken},
+        {"GET", "events", {"after"}, &Api::events},
+        {"GET", "preview", {}, &Api::preview},
+        {"POST", "captures", {}, &Api::start_capture},
+        {"GET", "jobs", {"after", "limit"}, &Api::jobs},
+        {"POST", "jobs", {}, &Api::enqueue},
+        {"GET", "jobs/{id}", {}, &Api::job},
+        {"DELETE", "jobs/{id}", {}, &Api::cancel},
+        {"GET", "jobs/{id}/log", {}, &Api::job_log},
+        {"GET", "sessions", {"after", "limit"}, &Api::sessions},
+        {"GET", "sessions/{name}", {}, &Api::session},
+        {"GET", "sessions/{name}/files", {}, &Api::files},
+        {"GET", "sessions/{name}/files/{path}", {}, &Api::file},
+        {"GET", "calibrations", {"after", "limit"}, &Api::calibrations},
+        {"POST", "catalog/rebuild", {}, &Api::rebuild},
+        {"GET", "openapi.json", {}, &Api::openapi},
+    };
+    return routes;
+}
+
+std::vector<std::string> Api::routes() const {
+    std::vector<std::string> names;
+    for (const Route& route : table()) names.push_back(fmt::format("{} {}", route.method, route.address));
+    return names;
 }
 
 ApiResponse Api::answer(const ApiRequest& request) const noexcept {
+    ApiResponse response;
     try {
-        return route(request);
+        response = route(request);
     } catch (const Rejected& rejected) {
-        ApiResponse response = problem(rejected.status, rejected.detail, rejected.hint);
+        response = problem(rejected.status, rejected.detail, rejected.hint);
         response.allow = rejected.allow;
-        return response;
     } catch (const NotFound& error) {
-        return problem(404, error.what(), error.hint());
+        response = problem(404, error.what(), error.hint());
     } catch (const Refused& error) {
-        return problem(409, error.what(), error.hint());
+        response = problem(409, error.what(), error.hint());
     } catch (const InputError& error) {
-        return problem(400, error.what(), error.hint());
+        response = problem(400, error.what(), error.hint());
     } catch (const Error& error) {
-        return problem(500, error.what(), error.hint());
+        response = problem(500, error.what(), error.hint());
     } catch (const std::exception& error) {
-        return problem(500, error.what(), "this is a defect of darkbox; please report it");
+        response = problem(500, error.what(), "this is a defect of darkbox; please report it");
     }
+    metrics_.count_request(response.status);
+    return response;
 }
 
 ApiResponse Api::route(const ApiRequest& request) const {
-    std::string_view path = request.target;
-    if (!path.starts_with(prefix)) no_such_address();
-    path.remove_prefix(prefix.size());
-    const auto question = path.find('?');
-    const std::string_view query = question == path.npos ? "" : path.substr(question + 1);
-    path = path.substr(0, question);
-
-    if (path == "events") {
-        need_method(request, {"GET"});
-        return {.content_type = "application/x-ndjson", .stream_events = events_after(query)};
+    const std::string_view target = request.target;
+    const auto question = target.find('?');
+    const std::string_view query = question == target.npos ? "" : target.substr(question + 1);
+    std::string_view address = target.substr(0, question);
+    if (address == "/metrics") {
+        if (request.method != "GET") throw Rejected{405, "/metrics is to be read", "use GET", "GET"};
+        ApiResponse response{.content_type = "text/plain; version=0.0.4", .body = metrics_.text(service_)};
+        return response;
     }
-    if (!query.empty()) throw InputError("this address takes no query", "leave out what follows the question mark");
-    if (path == "status") return need_method(request, {"GET"}), status();
-    if (path == "sessions") return need_method(request, {"GET"}), sessions();
-    if (path == "lamps") return need_method(request, {"GET"}), lamps();
-    if (path == "lamps/dark") return need_method(request, {"POST"}), darken();
-    if (path == "captures") return need_method(request, {"POST"}), start_capture(request);
-    constexpr std::string_view one_capture = "captures/";
-    if (!path.starts_with(one_capture)) no_such_address();
-    const std::uint64_t id = number(path.substr(one_capture.size()), "the capture's id");
-    need_method(request, {"GET", "DELETE"});
-    return request.method == "GET" ? reply(to_json(service_.job(id))) : reply(to_json(service_.cancel(id)), 202);
-}
+    if (!address.starts_with(prefix)) no_such_address();
+    address.remove_prefix(prefix.size());
 
-ApiResponse Api::status() const {
-    const ServiceStatus status = service_.status();
-    Json json{{"state", name(status.state)},
-              {"version", DARKBOX_VERSION},
-              {"rig", rig_.name},
-              {"camera", {{"driver", rig_.camera.driver}, {"device", rig_.camera.device}}},
-              {"lamps", {{"driver", rig_.lamps_driver}, {"count", rig_.lamps.size()}}},
-              {"sessions", std::filesystem::absolute(service_.sessions()).string()},
-              {"last_event", status.last_event}};
-    if (!status.problem.empty()) json["problem"] = status.problem;
-    if (status.running) json["running"] = to_json(*status.running);
-    return reply(json);
-}
-
-ApiResponse Api::sessions() const {
-    Json list = Json::array();
-    const ServiceStatus status = service_.status();
-    for (const SessionListing& session : list_sessions(service_.sessions())) {
-        Json json = describe(session);
-        if (status.running && status.running->session == session.name) json["state"] = "capturing";
-        list.push_back(std::move(json));
+    std::vector<std::string_view> methods;
+    for (const Route& route : table()) {
+        auto parts = match(route.address, address);
+        if (!parts) continue;
+        methods.push_back(route.method);
+        if (route.method == request.method)
+            return (this->*route.handler)({request, std::move(*parts), parse_query(query, route.query)});
     }
-    return reply({{"folder", std::filesystem::absolute(service_.sessions()).string()}, {"sessions", list}});
+    if (methods.empty()) no_such_address();
+    const std::string list = fmt::format("{}", fmt::join(methods, ", "));
+    throw Rejected{405, fmt::format("{} is not what this address takes", request.method.substr(0, 20)), "use " + list,
+                   list};
 }
-
-ApiResponse Api::lamps() const {
-    Json list = Json::array();
-    for (const LampDescription& lamp : rig_.lamps)
-        list.push_back({{"name", lamp.name}, {"position_mm", lamp.position_mm}});
-    return reply({{"driver", rig_.lamps_driver}, {"lamps", list}});
-}
-
-ApiResponse Api::start_capture(const ApiRequest& request) const {
-    need_json(request);
-    return reply(to_json(service_.start_capture(parse_capture_order(request.body))), 202);
-}
-
-ApiResponse Api::darken() const { return reply({{"event", service_.darken()}}, 202); }
 
 }  // namespace darkbox

@@ -13,6 +13,7 @@ using Json = nlohmann::json;
 
 constexpr std::size_t longest_text = 200;  ///< bytes
 constexpr std::size_t most_lamps = 1024;
+constexpr const char* known_kinds = "known: capture, recalibrate, calibrate, process, export";
 
 std::string text(const Json& value, const std::string& key) {
     if (!value.is_string()) throw InputError(fmt::format("\"{}\" is not a string", key), "put it in quotes");
@@ -37,10 +38,14 @@ std::vector<std::string> texts(const Json& value, const std::string& key) {
 
 }  // namespace
 
-CaptureOrder parse_capture_order(const std::string& body) {
-    const Json json = Json::parse(body, nullptr, /*allow_exceptions=*/false);
+Json parse_object(const std::string& body) {
+    Json json = Json::parse(body, nullptr, /*allow_exceptions=*/false);
     if (json.is_discarded()) throw InputError("the request's body is not JSON", "send one JSON object");
     if (!json.is_object()) throw InputError("the request's body is not a JSON object", "send one JSON object");
+    return json;
+}
+
+CaptureOrder capture_order_from(const Json& json) {
     CaptureOrder order;
     for (const auto& [key, value] : json.items()) {
         if (key == "object") {
@@ -51,12 +56,52 @@ CaptureOrder parse_capture_order(const std::string& body) {
             order.resume = text(value, key);
         } else if (key == "lamps") {
             order.lamps = texts(value, key);
-        } else {
+        } else if (key != "process") {  // what is to follow is the queue's concern
             throw InputError(fmt::format("unknown key \"{}\"", key.substr(0, longest_text)),
                              "known: object, lamps, name, resume");
         }
     }
     return order;
+}
+
+Job job_from(const Json& body) {
+    Job job;
+    job.orders = body;
+    const auto kind = body.find("kind");
+    if (kind == body.end()) throw InputError("the job has no \"kind\"", known_kinds);
+    const auto known = job_kind_from_name(text(*kind, "kind"));
+    if (!known) throw InputError(fmt::format("unknown kind \"{}\"", kind->get<std::string>()), known_kinds);
+    job.kind = *known;
+    job.orders.erase("kind");
+    if (lane_of(job.kind) == Lane::rig) {
+        if (const auto process = body.find("process"); process != body.end() && !process->is_boolean())
+            throw InputError("\"process\" is not true or false", "leave it out, or write true");
+        (void)capture_order_from(job.orders);
+        return job;
+    }
+    for (const auto& [key, value] : job.orders.items()) {
+        if (key == "session") {
+            job.session = text(value, key);
+        } else if (key == "format" && job.kind == JobKind::export_map) {
+            if (!export_target(text(value, key)))
+                throw InputError("unknown \"format\"", "known: lp, diligent, ptm, ptm-rgb, relight, ply");
+        } else {
+            throw InputError(fmt::format("unknown key \"{}\"", key.substr(0, longest_text)),
+                             "known: kind, session, and format for an export");
+        }
+    }
+    if (job.session.empty()) throw InputError("the job has no \"session\"", "name a sealed session");
+    if (job.kind == JobKind::export_map && !job.orders.contains("format"))
+        throw InputError("an export needs a \"format\"", "known: lp, diligent, ptm, ptm-rgb, relight, ply");
+    return job;
+}
+
+std::optional<std::string> export_target(const std::string& format) {
+    if (format == "lp") return "lights.lp";
+    if (format == "ply") return "surface.ply";
+    if (format == "ptm" || format == "ptm-rgb") return format + ".ptm";
+    if (format == "diligent" || format == "relight") return format;
+    return std::nullopt;
 }
 
 Json to_json(const CaptureOrder& order) {

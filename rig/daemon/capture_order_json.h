@@ -6,8 +6,14 @@
 
 namespace darkbox {
 
-/// The body of POST captures. Strict: throws InputError for what is not JSON, unknown keys, wrong types, long strings.
-CaptureOrder parse_capture_order(const std::string& body);
+/// A request's body. Throws InputError for what is not one JSON object.
+nlohmann::json parse_object(const std::string& body);
+
+/// The body of POST captures. Strict: throws InputError for unknown keys, wrong types, long strings.
+CaptureOrder capture_order_from(const nlohmann::json& body);
+
+/// The body of POST jobs: {"kind": …} and what the kind takes. Strict as well.
+Job job_from(const nlohmann::json& body);
 
 /// The body that makes this order.
 nlohmann::json to_json(const CaptureOrder& order);

@@ -112,7 +112,7 @@ Task<std::string> next_events(Shared& shared, std::uint64_t& number) {
     co_return text;
 }
 
-Task<> stream_events(Shared& shared, UnixStream& stream, ApiResponse answer) {
+Task<> stream_events(Shared& shared, UnixStream& stream, const ApiResponse& answer) {
     http::response<http::empty_body> head(http::status::ok, 11);
     head.set(http::field::content_type, answer.content_type);
     head.chunked(true);

@@ -20,8 +20,23 @@ struct CaptureOrder {
     std::optional<std::string> resume = {};  ///< name of an interrupted session
 };
 
-enum class JobState { running, done, cancelled, failed };
+enum class JobKind {
+    capture,
+    recalibrate,  ///< a capture of the ball, then a job of kind calibrate
+    calibrate,
+    process,     ///< all stages, then the report
+    export_map,  ///< into another program's format
+};
+std::string_view name(JobKind kind);
+std::optional<JobKind> job_kind_from_name(std::string_view name);
+
+/// Jobs of one lane run one after the other, in the order in which they were asked for.
+enum class Lane { rig, processing };
+Lane lane_of(JobKind kind);
+
+enum class JobState { queued, running, done, cancelled, failed };
 std::string_view name(JobState state);
+std::optional<JobState> job_state_from_name(std::string_view name);
 
 /// Why something did not work, for people.
 struct Failure {
@@ -30,17 +45,30 @@ struct Failure {
     std::string hint = {};
 };
 
-/// One capture that the service was asked for.
+/// Something that the service was asked for.
 struct Job {
     std::uint64_t id = 0;
-    std::string session = {};  ///< name of its folder
-    JobState state = JobState::running;
+    JobKind kind = JobKind::capture;
+    std::string session = {};  ///< name of its folder; empty until a queued capture begins
+    JobState state = JobState::queued;
+    nlohmann::json orders = nlohmann::json::object();  ///< what was asked, in the API's words
+    int attempts = 0;                                  ///< how often it was begun; above 1 after a crash
+    std::string created = {};                          ///< ISO 8601, UTC; so are the next two
+    std::string started = {};
+    std::string ended = {};
     ProgressUpdate progress = {};
-    CaptureOutcome outcome = {};  ///< when done
-    Failure failure = {};         ///< when cancelled or failed
-    std::uint64_t event = 0;      ///< everything about this job has a higher event number
+    CaptureOutcome outcome = {};      ///< of a capture, when done
+    nlohmann::json result = nullptr;  ///< of processing, when done: what the command prints with --json
+    Failure failure = {};             ///< when cancelled or failed
+    std::uint64_t next = 0;           ///< the job that follows from this one, when done; 0 = none
+    std::uint64_t event = 0;          ///< everything about this job has a higher event number
+
+    bool ended_already() const { return state != JobState::queued && state != JobState::running; }
 };
 
 nlohmann::json to_json(const Job& job);
+
+/// Where below SESSION/exports an export into this format goes; no value for an unknown format.
+std::optional<std::string> export_target(const std::string& format);
 
 }  // namespace darkbox

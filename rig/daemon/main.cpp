@@ -12,6 +12,7 @@
 #include "rig/daemon/hardware.h"
 #include "rig/daemon/http_server.h"
 #include "rig/daemon/notify.h"
+#include "rig/daemon/processing_command.h"
 #include "rig/daemon/service.h"
 #include "rig/daemon/session_folder.h"
 
@@ -55,8 +56,10 @@ public:
           server_(
               io_, server_options(socket), [this](const ApiRequest& request) { return api_->answer(request); }, log_) {
         fs::create_directories(sessions);
-        service_.emplace([this] { return hardware_.open(); }, ServiceOptions{.sessions = sessions}, log_);
-        api_.emplace(rig_, *service_);
+        ServiceOptions options{.sessions = sessions};
+        options.run_processing = processing_by(darkbox_beside_this_program());
+        service_.emplace([this] { return hardware_.open(); }, options, log_);
+        api_.emplace(rig_, *service_, metrics_);
         await_signal();
         feed_watchdog();
     }
@@ -120,6 +123,7 @@ private:
     asio::steady_timer leave_;
     bool stopping_ = false;
     HttpServer server_;
+    Metrics metrics_;
     std::optional<Service> service_;
     std::optional<Api> api_;
 };

@@ -2,9 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "acquisition/frame/error.h"
+#include "acquisition/session/bag.h"
+#include "rig/daemon/attempt.h"
+#include "rig/daemon/capture_order_json.h"
 #include "rig/daemon/session_folder.h"
 
 namespace darkbox {
@@ -22,24 +23,6 @@ std::string hint_for(const Failure& failure, const std::filesystem::path& sessio
     const std::string resume = fmt::format(fmt::runtime(resume_hint), session.filename().string());
     if (failure.cancelled || failure.hint.empty()) return resume;
     return has_journal(session) ? failure.hint + "; " + resume : failure.hint;
-}
-
-/// The single place of the daemon's work that catches: whatever goes wrong comes back as words.
-std::optional<Failure> attempt(const std::function<void()>& work) noexcept {
-    try {
-        work();
-        return std::nullopt;
-    } catch (const Cancelled& stopped) {
-        return Failure{.cancelled = true, .what = stopped.what(), .hint = stopped.hint()};
-    } catch (const Error& error) {
-        return Failure{.what = error.what(), .hint = error.hint()};
-    } catch (const std::bad_alloc&) {
-        return Failure{.what = "out of memory", .hint = "close other programs"};
-    } catch (const std::exception& error) {
-        return Failure{.what = error.what(), .hint = "this is a defect of darkbox; please report it"};
-    } catch (...) {
-        return Failure{.what = "unknown error", .hint = "this is a defect of darkbox; please report it"};
-    }
 }
 
 std::string state_hint(ServiceState state, const std::string& problem) {
@@ -63,7 +46,6 @@ std::string state_hint(ServiceState state, const std::string& problem) {
 }  // namespace
 
 Refused::~Refused() = default;
-NotFound::~NotFound() = default;
 
 std::string_view name(ServiceState state) {
     switch (state) {
@@ -83,6 +65,10 @@ Service::Service(OpenRig open, ServiceOptions options, EventLog& log)
     : open_(std::move(open)),
       options_(std::move(options)),
       log_(log),
+      lock_(options_.sessions / Catalog::own_folder_name),
+      catalog_(options_.sessions),
+      book_(catalog_, log_, options_.jobs_kept),
+      processing_(book_, catalog_, options_.run_processing),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
 Service::~Service() { request_stop(); }
@@ -96,11 +82,13 @@ std::optional<std::string> Service::stop() {
 ServiceStatus Service::status() const {
     const std::scoped_lock lock(mutex_);
     ServiceStatus status{.state = state_, .problem = problem_, .last_event = log_.last()};
-    if (running_ != 0) status.running = jobs_.at(running_);
+    if (running_ != 0) status.running = book_.find(running_);
+    status.queued = book_.unfinished(Lane::rig) - (running_ != 0 ? 1 : 0);
+    status.processing = book_.unfinished(Lane::processing);
     return status;
 }
 
-CaptureRequest Service::request_for(const CaptureOrder& order) const {
+CaptureRequest Service::request_for(const CaptureOrder& order, int attempt) const {
     const bool resumes = order.resume.has_value();
     if (resumes && !(order.name.empty() && order.object.empty()))
         throw InputError("a resumed session keeps its name and object", "give either \"resume\" or the others");
@@ -115,7 +103,8 @@ CaptureRequest Service::request_for(const CaptureOrder& order) const {
     const bool there = std::filesystem::exists(request.folder);
     if (resumes && !there)
         throw NotFound(fmt::format("there is no session \"{}\"", session), "darkbox sessions lists them");
-    if (!resumes && there)
+    // After a crash its own folder may be there, with nothing in it yet.
+    if (!resumes && there && attempt <= 1)
         throw InputError(fmt::format("there is a session \"{}\" already", session),
                          "resume it, or choose another name");
     return request;
@@ -125,27 +114,31 @@ Job Service::start_capture(const CaptureOrder& order) {
     const std::scoped_lock lock(mutex_);
     if (stopping_) throw Refused("darkboxd is shutting down", "start it again");
     if (state_ != ServiceState::idle) refuse(state_, problem_);
-    CaptureRequest request = request_for(order);
-    const Job job{.id = ++last_job_, .session = request.folder.filename().string(), .event = log_.last()};
-    jobs_.emplace(job.id, job);
-    forget_old_jobs();
+    const CaptureRequest request = request_for(order, 1);
+    Job job;
+    job.session = request.folder.filename().string();
+    job.state = JobState::running;
+    job.orders = to_json(order);
+    job = book_.add(std::move(job));
     running_ = job.id;
-    job_stop_ = std::stop_source();
-    tasks_.emplace_back(Capture{job.id, std::move(request), job_stop_.get_token()});
+    tasks_.emplace_back(job);
     enter(ServiceState::busy, "");
     wake_.notify_all();
     return job;
 }
 
-Job Service::job(std::uint64_t id) const {
+Job Service::enqueue(Job job) {
     const std::scoped_lock lock(mutex_);
-    return find(id);
-}
-
-Job Service::cancel(std::uint64_t id) {
-    const std::scoped_lock lock(mutex_);
-    const Job& job = find(id);
-    if (job.id == running_) job_stop_.request_stop();
+    if (stopping_) throw Refused("darkboxd is shutting down", "start it again");
+    if (lane_of(job.kind) == Lane::rig) {
+        (void)request_for(capture_order_from(job.orders), 1);
+    } else if (!options_.run_processing) {
+        throw Refused("this darkboxd does not process", "process with the command: darkbox process SESSION");
+    } else if (!is_sealed(session_path(options_.sessions, job.session))) {
+        throw NotFound(fmt::format("there is no sealed session \"{}\"", job.session), "darkbox sessions lists them");
+    }
+    job = book_.add(std::move(job));
+    wake_.notify_all();
     return job;
 }
 
@@ -153,7 +146,7 @@ std::uint64_t Service::darken() {
     const std::scoped_lock lock(mutex_);
     if (state_ == ServiceState::offline) refuse(state_, problem_);
     const std::uint64_t event = log_.last();
-    if (state_ == ServiceState::busy) job_stop_.request_stop();
+    if (state_ == ServiceState::busy) book_.cancel(running_);
     tasks_.emplace_back(Darken{});  // also after a capture: its own darkening may have been told before `event`
     wake_.notify_all();
     return event;
@@ -163,20 +156,10 @@ void Service::request_stop() noexcept {
     {
         const std::scoped_lock lock(mutex_);
         stopping_ = true;
-        job_stop_.request_stop();
     }
+    book_.cancel_running(Lane::rig);
+    processing_.request_stop();
     thread_.request_stop();
-}
-
-const Job& Service::find(std::uint64_t id) const {
-    const auto found = jobs_.find(id);
-    if (found == jobs_.end())
-        throw NotFound(fmt::format("there is no capture {}", id), "the daemon keeps the last ones only");
-    return found->second;
-}
-
-void Service::forget_old_jobs() {
-    while (jobs_.size() > options_.jobs_kept) jobs_.erase(jobs_.begin());
 }
 
 void Service::run(const std::stop_token& stop) {
@@ -204,28 +187,49 @@ bool Service::open_rig(const std::stop_token& stop) {
 
 std::optional<Service::Task> Service::next_task(const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
-    wake_.wait(lock, stop, [this] { return !tasks_.empty(); });
+    const auto may_take = [this] { return state_ == ServiceState::idle && !stopping_ && book_.has_queued(Lane::rig); };
+    wake_.wait(lock, stop, [&] { return !tasks_.empty() || may_take(); });
     // A capture that was accepted still ends as a job does, cancelled at once, so that its listeners hear of it.
-    if (tasks_.empty()) return std::nullopt;
-    Task task = std::move(tasks_.front());
-    tasks_.pop_front();
-    return task;
+    if (!tasks_.empty()) {
+        Task task = std::move(tasks_.front());
+        tasks_.pop_front();
+        return task;
+    }
+    if (!may_take()) return std::nullopt;
+    auto job = book_.take(Lane::rig);
+    if (!job) return std::nullopt;
+    running_ = job->id;
+    enter(ServiceState::busy, "");
+    return std::move(*job);
 }
 
-void Service::perform(const Capture& capture) {
+void Service::capture(Job& job, const WorkContext& work) {
+    if (work.cancelled()) throw Cancelled("the capture was cancelled before it began", "");
+    CaptureOrder order = capture_order_from(job.orders);
+    if (!order.resume && !job.session.empty()) order.name = job.session;
+    // A session of its own that start_capture() has just named is not there yet; after a crash it may be.
+    const CaptureRequest request = request_for(order, job.attempts);
+    job.session = request.folder.filename().string();
+    book_.set_session(job.id, job.session);
+    job.outcome = rig_->capture(request, work);
+    frames_captured_ += job.outcome.frames;
+    exposures_repeated_ += static_cast<std::uint64_t>(job.outcome.repeated);
+}
+
+void Service::perform(const Job& begun) {
+    Job job = begun;
     WorkContext work;
-    work.stop = capture.stop;
-    work.report = [&](const ProgressUpdate& update) { report_progress(capture.job, update); };
-    Job ended = job(capture.job);
-    const auto failure = attempt([&] {
-        if (work.cancelled()) throw Cancelled("the capture was cancelled before it began", "");
-        ended.outcome = rig_->capture(capture.request, work);
-    });
+    work.stop = book_.stop_token(job.id);
+    work.report = [&](const ProgressUpdate& update) {
+        book_.progress(job.id, update);
+        book_.note(job.id, fmt::format("{} {}/{} {}", update.stage, update.done, update.total, update.detail));
+    };
+    const auto failure = attempt([&] { capture(job, work); });
     const auto not_dark = darken_lamps();
-    ended.state = !failure ? JobState::done : failure->cancelled ? JobState::cancelled : JobState::failed;
-    if (failure) ended.failure = *failure;
-    if (failure) ended.failure.hint = hint_for(*failure, capture.request.folder);
-    finish(std::move(ended), not_dark);
+    job.state = !failure ? JobState::done : failure->cancelled ? JobState::cancelled : JobState::failed;
+    if (failure) job.failure = *failure;
+    if (failure) job.failure.hint = hint_for(*failure, options_.sessions / job.session);
+    finish(std::move(job), not_dark);
 }
 
 void Service::perform(Darken) {
@@ -241,28 +245,14 @@ std::optional<Failure> Service::darken_lamps() {
     return failure;
 }
 
-void Service::report_progress(std::uint64_t id, const ProgressUpdate& update) {
-    {
-        const std::scoped_lock lock(mutex_);
-        jobs_.at(id).progress = update;
-    }
-    log_.publish("progress", {{"capture", id},
-                              {"stage", update.stage},
-                              {"done", update.done},
-                              {"total", update.total},
-                              {"detail", update.detail}});
-}
-
 /// The job's last event comes after the state's, so that whoever hears it may ask for the next capture.
 void Service::finish(Job job, const std::optional<Failure>& not_dark) {
+    // What the catalogue cannot take now it reads when it next looks.
+    if (!job.session.empty()) (void)attempt([&] { catalog_.refresh(job.session); });
     const std::scoped_lock lock(mutex_);
-    job.progress = jobs_.at(job.id).progress;
     running_ = 0;
     enter(not_dark ? ServiceState::fault : ServiceState::idle, not_dark ? not_dark->what : "");
-    nlohmann::json fields = to_json(job);
-    fields["capture"] = job.id;
-    log_.publish(std::string(name(job.state)), std::move(fields));
-    jobs_.at(job.id) = std::move(job);
+    book_.finish(std::move(job));
 }
 
 /// With mutex_ held.

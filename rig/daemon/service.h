@@ -1,12 +1,12 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <filesystem>
 #include <functional>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -19,7 +19,10 @@
 #include "acquisition/frame/error.h"
 #include "rig/daemon/capture_rig.h"
 #include "rig/daemon/events.h"
+#include "rig/daemon/folder_lock.h"
 #include "rig/daemon/job.h"
+#include "rig/daemon/job_book.h"
+#include "rig/daemon/processing_lane.h"
 
 namespace darkbox {
 
@@ -31,7 +34,7 @@ namespace darkbox {
 enum class ServiceState {
     offline,  ///< the rig's devices are not open yet; opening is tried again and again
     idle,
-    busy,   ///< a capture runs
+    busy,   ///< a capture runs; processing does not count
     fault,  ///< the lamps could not be proven dark; left by a successful lamps/dark
 };
 std::string_view name(ServiceState state);
@@ -43,23 +46,19 @@ public:
     ~Refused() override;
 };
 
-/// There is no such job or session.
-class NotFound : public Error {
-public:
-    using Error::Error;
-    ~NotFound() override;
-};
-
 struct ServiceOptions {
     std::filesystem::path sessions = "sessions";  ///< the folder that holds the sessions
     std::chrono::milliseconds reopen_every{2000};
-    std::size_t jobs_kept = 64;  ///< finished jobs that can still be asked for
+    std::size_t jobs_kept = 1000;       ///< finished jobs that can still be asked for
+    RunProcessing run_processing = {};  ///< empty: there is none, and such jobs are refused
 };
 
 struct ServiceStatus {
     ServiceState state = ServiceState::offline;
     std::string problem = {};  ///< why Offline or Fault, in words
     std::optional<Job> running = {};
+    std::size_t queued = 0;      ///< captures that wait
+    std::size_t processing = 0;  ///< processing jobs, running or waiting
     std::uint64_t last_event = 0;
 };
 
@@ -68,6 +67,7 @@ struct ServiceStatus {
 /// Thread-safe.
 class Service {
 public:
+    /// Takes up the queue that an earlier daemon left. Throws InputError when another daemon has the sessions' folder.
     Service(OpenRig open, ServiceOptions options, EventLog& log);
     Service(const Service&) = delete;
     Service& operator=(const Service&) = delete;
@@ -77,13 +77,23 @@ public:
     ServiceStatus status() const;
     /// Throws Refused, NotFound, or InputError for an order that makes no sense.
     Job start_capture(const CaptureOrder& order);
-    Job job(std::uint64_t id) const;
+    /// For later, in the order of asking: a capture begins once the rig is idle. `job` says kind, session and orders.
+    /// Throws as start_capture() does.
+    Job enqueue(Job job);
+    Job job(std::uint64_t id) const { return book_.find(id); }
+    std::vector<Job> jobs(const PageRequest& page) const { return book_.list(page); }
+    std::filesystem::path job_log(std::uint64_t id) const { return book_.log_file(id); }
     /// Asks the job to stop; a finished one is left as it is.
-    Job cancel(std::uint64_t id);
+    Job cancel(std::uint64_t id) { return book_.cancel(id); }
     /// Darkens the lamps; a running capture is cancelled for it. The event "lamps" tells how it went.
     /// Returns the number after which that event comes. Throws Refused when Offline.
     std::uint64_t darken();
+    /// Since the daemon started.
+    JobCounts job_counts() const { return book_.counts(); }
+    std::uint64_t frames_captured() const { return frames_captured_; }
+    std::uint64_t exposures_repeated() const { return exposures_repeated_; }
     const std::filesystem::path& sessions() const { return options_.sessions; }
+    Catalog& catalog() { return catalog_; }
 
     /// Cancels what runs and lets the thread end; the event log is closed when it did.
     void request_stop() noexcept;
@@ -91,46 +101,43 @@ public:
     std::optional<std::string> stop();
 
 private:
-    struct Capture {
-        std::uint64_t job = 0;
-        CaptureRequest request;
-        std::stop_token stop;
-    };
     struct Darken {};
-    using Task = std::variant<Capture, Darken>;
+    using Task = std::variant<Job, Darken>;
 
-    CaptureRequest request_for(const CaptureOrder& order) const;
-    const Job& find(std::uint64_t id) const;
-    void forget_old_jobs();
+    CaptureRequest request_for(const CaptureOrder& order, int attempt) const;
 
     void run(const std::stop_token& stop);
     bool open_rig(const std::stop_token& stop);
     std::optional<Task> next_task(const std::stop_token& stop);
-    void perform(const Capture& capture);
+    void perform(const Job& job);
+    void capture(Job& job, const WorkContext& work);
     void perform(Darken);
     std::optional<Failure> darken_lamps();
-    void report_progress(std::uint64_t id, const ProgressUpdate& update);
     void finish(Job job, const std::optional<Failure>& not_dark);
     void enter(ServiceState state, const std::string& problem);
 
     const OpenRig open_;
     const ServiceOptions options_;
     EventLog& log_;
+    const FolderLock lock_;
+    Catalog catalog_;
+    JobBook book_;
 
     mutable std::mutex mutex_;
     std::condition_variable_any wake_;
     ServiceState state_ = ServiceState::offline;  // guarded by mutex_
     std::string problem_;                         // guarded by mutex_
     std::deque<Task> tasks_;                      // guarded by mutex_
-    std::map<std::uint64_t, Job> jobs_;           // guarded by mutex_
     std::uint64_t running_ = 0;                   // guarded by mutex_; 0 = none
-    std::stop_source job_stop_;                   // guarded by mutex_
-    std::uint64_t last_job_ = 0;                  // guarded by mutex_
     bool stopping_ = false;                       // guarded by mutex_
+
+    std::atomic<std::uint64_t> frames_captured_{0};
+    std::atomic<std::uint64_t> exposures_repeated_{0};
 
     std::unique_ptr<CaptureRig> rig_;  // the thread's own
     std::optional<Failure> not_dark_;  // the thread's own until it was joined
-    std::jthread thread_;              // last: ends before what it uses
+    ProcessingLane processing_;
+    std::jthread thread_;  // last: ends before what it uses
 };
 
 }  // namespace darkbox

@@ -76,13 +76,6 @@ SessionListing describe_interrupted(const fs::path& folder) {
     return listing;
 }
 
-std::optional<SessionListing> describe(const fs::path& folder) {
-    if (!is_session_name(folder.filename().string())) return std::nullopt;
-    if (is_sealed(folder)) return describe_sealed(folder);
-    if (fs::exists(folder / journal_name)) return describe_interrupted(folder);
-    return std::nullopt;
-}
-
 }  // namespace
 
 std::string name(State state) {
@@ -97,14 +90,35 @@ std::string name(State state) {
     return "damaged";
 }
 
+State session_state_from_name(const std::string& text) {
+    for (const State state : {State::sealed, State::interrupted})
+        if (name(state) == text) return state;
+    return State::damaged;
+}
+
+std::optional<SessionListing> describe_session(const fs::path& folder) {
+    if (!is_session_name(folder.filename().string())) return std::nullopt;
+    if (is_sealed(folder)) return describe_sealed(folder);
+    if (fs::exists(folder / journal_name)) return describe_interrupted(folder);
+    return std::nullopt;
+}
+
+std::vector<std::string> session_names(const fs::path& folder) {
+    std::vector<std::string> names;
+    if (!fs::is_directory(folder)) return names;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+        std::string name = entry.path().filename().string();
+        if (is_session_name(name) && entry.symlink_status().type() == fs::file_type::directory)
+            names.push_back(std::move(name));
+    }
+    std::ranges::sort(names);
+    return names;
+}
+
 std::vector<SessionListing> list_sessions(const fs::path& folder) {
     std::vector<SessionListing> sessions;
-    if (!fs::is_directory(folder)) return sessions;
-    for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-        if (!entry.is_directory()) continue;
-        if (auto session = describe(entry.path())) sessions.push_back(std::move(*session));
-    }
-    std::ranges::sort(sessions, {}, &SessionListing::name);
+    for (const std::string& name : session_names(folder))
+        if (auto session = describe_session(folder / name)) sessions.push_back(std::move(*session));
     return sessions;
 }
 

@@ -24,6 +24,14 @@ struct SessionListing {
 };
 
 std::string name(SessionListing::State state);
+/// And back; anything unknown is `damaged`.
+SessionListing::State session_state_from_name(const std::string& name);
+
+/// The names of the folder's entries that may be sessions, sorted; folders only, links are not followed.
+std::vector<std::string> session_names(const std::filesystem::path& folder);
+
+/// No value when the folder is no session. Never throws for a damaged one.
+std::optional<SessionListing> describe_session(const std::filesystem::path& session);
 
 /// Sorted by name. Folders that are no sessions are left out; an absent folder holds none.
 std::vector<SessionListing> list_sessions(const std::filesystem::path& folder);

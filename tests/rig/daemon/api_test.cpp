@@ -17,7 +17,9 @@ using namespace test;
 
 class ApiTest : public testing::Test {
 protected:
-    ApiTest() : service_(open_fake(script_), ServiceOptions{.sessions = folder_.path()}, log_), api_(rig_, service_) {
+    ApiTest()
+        : service_(open_fake(script_), ServiceOptions{.sessions = folder_.path()}, log_),
+          api_(rig_, service_, metrics_) {
         EXPECT_TRUE(reaches(service_, ServiceState::idle));
     }
     ApiResponse get(const std::string& target) { return api_.answer({.method = "GET", .target = "/api/v1/" + target}); }
@@ -32,6 +34,7 @@ protected:
     FakeRigScript script_;
     EventLog log_;
     RigDescription rig_ = parse_rig(simulated_rig_toml(4), "rig.toml");
+    Metrics metrics_;
     Service service_;
     Api api_;
 };
@@ -53,7 +56,7 @@ TEST_F(ApiTest, RunsACaptureToItsEnd) {
     EXPECT_EQ(accepted.status, 202);
     const json job = json::parse(accepted.body);
     EXPECT_EQ(job.at("session"), "first");
-    const std::string target = "captures/" + std::to_string(job.at("id").get<int>());
+    const std::string target = "jobs/" + std::to_string(job.at("id").get<int>());
     EXPECT_EQ(json::parse(get(target).body).at("state"), "running");
     EXPECT_EQ(json::parse(get("status").body).at("running").at("session"), "first");
 
@@ -73,10 +76,10 @@ TEST_F(ApiTest, RunsACaptureToItsEnd) {
 TEST_F(ApiTest, CancelsACapture) {
     script_.body = run_until_cancelled;
     const json job = json::parse(post("captures", R"({"object":"vase"})").body);
-    const std::string target = "/api/v1/captures/" + std::to_string(job.at("id").get<int>());
+    const std::string target = "/api/v1/jobs/" + std::to_string(job.at("id").get<int>());
     EXPECT_EQ(api_.answer({.method = "DELETE", .target = target}).status, 202);
     ASSERT_TRUE(reaches(service_, ServiceState::idle));
-    EXPECT_EQ(json::parse(get("captures/1").body).at("state"), "cancelled");
+    EXPECT_EQ(json::parse(get("jobs/1").body).at("state"), "cancelled");
 }
 
 TEST_F(ApiTest, DarkensTheLamps) {
@@ -153,12 +156,12 @@ INSTANTIATE_TEST_SUITE_P(
                     BadRequest{"POST", "/api/v1/status", "", 405, "POST"},
                     BadRequest{"BREW", "/api/v1/lamps/dark", "", 405, "BREW"},
                     BadRequest{"GET", "/api/v1/captures", "", 405, "GET"},
-                    BadRequest{"GET", "/api/v1/captures/", "", 400, "number"},
-                    BadRequest{"GET", "/api/v1/captures/-1", "", 400, "number"},
-                    BadRequest{"GET", "/api/v1/captures/1x", "", 400, "number"},
-                    BadRequest{"GET", "/api/v1/captures/99999999999999999999999", "", 400, "number"},
-                    BadRequest{"GET", "/api/v1/captures/7", "", 404, "no capture 7"},
-                    BadRequest{"DELETE", "/api/v1/captures/7", "", 404, "no capture 7"},
+                    BadRequest{"GET", "/api/v1/jobs/", "", 400, "number"},
+                    BadRequest{"GET", "/api/v1/jobs/-1", "", 400, "number"},
+                    BadRequest{"GET", "/api/v1/jobs/1x", "", 400, "number"},
+                    BadRequest{"GET", "/api/v1/jobs/99999999999999999999999", "", 400, "number"},
+                    BadRequest{"GET", "/api/v1/jobs/7", "", 404, "no job 7"},
+                    BadRequest{"DELETE", "/api/v1/jobs/7", "", 404, "no job 7"},
                     BadRequest{"GET", "/api/v1/events?after=-1", "", 400, "number"},
                     BadRequest{"GET", "/api/v1/events?before=1", "", 400, "query"},
                     BadRequest{"POST", "/api/v1/captures", "", 400, "not JSON"},
@@ -191,7 +194,7 @@ TEST_F(ApiTest, WantsJsonToBeCalledSo) {
 }
 
 TEST_F(ApiTest, NamesTheMethodsThatWouldDo) {
-    EXPECT_EQ(api_.answer({.method = "PUT", .target = "/api/v1/captures/1"}).allow, "GET, DELETE");
+    EXPECT_EQ(api_.answer({.method = "PUT", .target = "/api/v1/jobs/1"}).allow, "GET, DELETE");
 }
 
 }  // namespace

@@ -32,7 +32,7 @@ protected:
         options_.socket = folder_.path() / "d.sock";
         fs::create_directory(folder_.path() / "sessions");
         service_.emplace(open_fake(script_), ServiceOptions{.sessions = folder_.path() / "sessions"}, log_);
-        api_.emplace(rig_, *service_);
+        api_.emplace(rig_, *service_, metrics_);
         ASSERT_TRUE(reaches(*service_, ServiceState::idle));
     }
     void serve() {
@@ -70,6 +70,7 @@ protected:
     RigDescription rig_ = parse_rig(simulated_rig_toml(4), "rig.toml");
     HttpServerOptions options_;
     std::optional<Service> service_;
+    Metrics metrics_;
     std::optional<Api> api_;
     asio::io_context io_;
     asio::io_context client_io_;
@@ -121,9 +122,9 @@ TEST_F(HttpServerTest, RefusesASecondCaptureAndCancelsTheFirst) {
     const auto second = client().request("POST", "captures", {{"object", "vase"}});
     EXPECT_EQ(second.status, 409);
     EXPECT_THAT(second.body.at("detail").get<std::string>(), HasSubstr("Busy"));
-    client().call("DELETE", "captures/" + job.at("id").dump());
+    client().call("DELETE", "jobs/" + job.at("id").dump());
     ASSERT_TRUE(reaches(*service_, ServiceState::idle));
-    EXPECT_EQ(client().call("GET", "captures/" + job.at("id").dump()).at("state"), "cancelled");
+    EXPECT_EQ(client().call("GET", "jobs/" + job.at("id").dump()).at("state"), "cancelled");
 }
 
 TEST_F(HttpServerTest, EndsStreamsWhenTheServiceStops) {

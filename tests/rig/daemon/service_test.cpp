@@ -91,7 +91,7 @@ TEST_F(ServiceTest, CapturesAndIsIdleAgain) {
     EXPECT_FALSE(service.status().running);
     EXPECT_FALSE(script_.lit);
     EXPECT_THAT(event_types(log_), ElementsAre("state", "state", "progress", "lamps", "state", "done"));
-    EXPECT_EQ(all_events(log_).back().at("capture"), job.id);
+    EXPECT_EQ(all_events(log_).back().at("job"), job.id);
 }
 
 TEST_F(ServiceTest, RefusesACaptureInEveryStateButIdle) {

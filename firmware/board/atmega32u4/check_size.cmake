@@ -1,0 +1,27 @@
+# Prints what the image takes of the chip, and fails the build above its bounds.
+set(flash_of_chip 32768)
+set(ram_of_chip 2560)
+set(flash_percent 60)
+set(ram_percent 50)
+
+execute_process(COMMAND avr-size -A ${ELF} OUTPUT_VARIABLE sections COMMAND_ERROR_IS_FATAL ANY)
+foreach(section text data bss noinit)
+  set(${section} 0)
+  if(sections MATCHES "\\.${section} +([0-9]+)")
+    set(${section} ${CMAKE_MATCH_1})
+  endif()
+endforeach()
+
+math(EXPR flash "${text} + ${data}")
+math(EXPR ram "${data} + ${bss} + ${noinit}")
+foreach(kind flash ram)
+  math(EXPR tenths "${${kind}} * 1000 / ${${kind}_of_chip}")
+  math(EXPR whole "${tenths} / 10")
+  math(EXPR tenth "${tenths} % 10")
+  message("lamp controller: ${kind} ${${kind}} of ${${kind}_of_chip} bytes, ${whole}.${tenth} %"
+    " (at most ${${kind}_percent} %)")
+  math(EXPR bound "${${kind}_percent} * 10")
+  if(tenths GREATER bound)
+    message(FATAL_ERROR "the lamp controller's image takes too much ${kind}")
+  endif()
+endforeach()
