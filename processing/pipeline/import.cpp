@@ -267,11 +267,13 @@ Session import_photographs(const ImportOptions& options, const WorkContext& work
         info.geometry.emplace();
         info.geometry->ball_diameter_mm = options.ball_diameter_mm;
     }
-    const bool was_there = fs::exists(options.out);
+    std::error_code ignored;
+    const bool was_there = fs::exists(options.out, ignored);
     try {
         return write_session(info, options.out, all, extras, work);
     } catch (...) {
-        if (!was_there) fs::remove_all(options.out);
+        if (!was_there)  // what went wrong is the news, not that nothing can be removed
+            fs::remove_all(options.out, ignored);
         throw;
     }
 }

@@ -212,7 +212,7 @@ NormalsSummary run_normals(const Session& session, const NormalsOptions& options
     if (auto warning = contradiction(session, photos, summary.lights, work))
         summary.warnings.push_back(std::move(*warning));
     watch.lap();
-    remove_derived(session, {"texels", "shading"});
+    summary.removed = remove_derived(session, {"texels", "shading"});
     write_maps(files, solved.stereo, work);
     for (const auto& stale : {files.height, files.surface}) std::filesystem::remove(stale);
     if (options.surface) summary.height = write_surface(files, solved.stereo, solved.calibration.view, work);

@@ -10,6 +10,7 @@
 #include "processing/pipeline/stages.h"
 #include "processing/pipeline/steps.h"
 #include "rig/cli/arguments.h"
+#include "rig/cli/choices.h"
 #include "rig/cli/commands.h"
 #include "rig/cli/relight_options.h"
 #include "rig/cli/relit_files.h"
@@ -44,11 +45,11 @@ void require_one_kind_of_light(const Arguments& a) {
     const std::size_t kinds = std::size_t{!a.relight.lights.empty() || !a.relight.lamp_positions.empty()} +
                               a.relight.environments.size() + std::size_t{circle} + std::size_t{a.constant_r > 0};
     if (kinds != 1)
-        throw InputError("relight needs one kind of light: lights, an environment, a circling light or a constant r",
+        throw UsageError("relight needs one kind of light: lights, an environment, a circling light or a constant r",
                          "give --light X,Y,Z or --light-position X,Y,Z (once or more), --environment FILE, --sequence "
                          "circle or --constant-r N");
     if (turn && a.relight.environments.empty())
-        throw InputError("--sequence turn turns an environment, and there is none", "give --environment FILE");
+        throw UsageError("--sequence turn turns an environment, and there is none", "give --environment FILE");
 }
 
 /// `turn` 0...1 of the circle: from the viewer's right by way of above. At 90 degrees the light is at the camera.
@@ -162,7 +163,7 @@ void add_relight_command(CommandLine& line) {
     command
         .add_option("--sequence", a->sequence,
                     "circle: a light goes round the object; turn: the environment turns about the upright axis")
-        ->transform(CLI::CheckedTransformer(sequences).description("{circle,turn}"));
+        ->transform(one_of(sequences));
     command.add_option("--frames", a->frames, "Pictures of a whole sequence")
         ->check(CLI::Range(1, 100000))
         ->capture_default_str();

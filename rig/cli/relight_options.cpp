@@ -4,6 +4,7 @@
 
 #include "processing/pipeline/session_geometry.h"
 #include "rig/cli/arguments.h"
+#include "rig/cli/choices.h"
 
 namespace darkbox {
 
@@ -28,16 +29,16 @@ void add_relight_options(CLI::App& command, RelightArguments& a) {
     command
         .add_option("--model", a.options.model,
                     "lambert; phong: one coefficient, highlights of the texel's colour; phong-split: a coat of gloss")
-        ->transform(CLI::CheckedTransformer(models).description("{lambert,phong,phong-split}"));
+        ->transform(one_of(models));
     const std::map<std::string, Lookup> lookups{{"thesis", Lookup::thesis}, {"detail", Lookup::detail}};
     command
         .add_option("--lookup", a.options.lookup, "thesis: the texel's radiance; detail: scaled by the pixel's albedo")
-        ->transform(CLI::CheckedTransformer(lookups).description("{thesis,detail}"));
+        ->transform(one_of(lookups));
     const std::map<std::string, OutOfRange> beyond{{"clamp", OutOfRange::clamp}, {"scale", OutOfRange::scale}};
     command
         .add_option("--out-of-range", a.options.out_of_range,
                     "Coefficients above 1 (k_d + k_s > 1): clamp to the brightest level, or scale it")
-        ->transform(CLI::CheckedTransformer(beyond).description("{clamp,scale}"));
+        ->transform(one_of(beyond));
     command.add_option("--diffuse", a.options.phong_diffuse, "Phong's k_d, 0 to 1")->capture_default_str();
     command.add_option("--specular", a.options.phong_specular, "Phong's k_s, 0 to 1")->capture_default_str();
     command.add_option("--exponent", a.options.phong_exponent, "Phong's exponent, 1 to 1000")->capture_default_str();

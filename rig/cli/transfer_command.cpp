@@ -18,6 +18,7 @@
 #include "processing/pipeline/stages.h"
 #include "processing/transfer/transfer.h"
 #include "rig/cli/arguments.h"
+#include "rig/cli/choices.h"
 #include "rig/cli/commands.h"
 #include "rig/cli/relight_options.h"
 #include "rig/cli/relit_files.h"
@@ -55,14 +56,14 @@ struct Source {
 Source load_source(const Arguments& a) {
     const bool plain = !a.source_normals.empty() || !a.source_albedo.empty();
     if (plain == !a.source.empty())
-        throw InputError("transfer needs one source",
+        throw UsageError("transfer needs one source",
                          "give --source SESSION, or --source-normals FILE and --source-albedo FILE");
     if (!plain) {
         RelightScene scene = load_scene(Session::open(a.source));
         return {{std::move(scene.normals), std::move(scene.albedo), std::move(scene.index)}, std::move(scene.shading)};
     }
     if (a.source_normals.empty() || a.source_albedo.empty())
-        throw InputError("a source of plain maps needs both maps",
+        throw UsageError("a source of plain maps needs both maps",
                          "give --source-normals FILE and --source-albedo FILE");
     const cv::Mat1b mask = a.source_mask.empty() ? cv::Mat1b() : read_mask(a.source_mask);
     TransferSource maps;
@@ -95,7 +96,7 @@ Target load_target(const Arguments& a) {
 
 ControlMaps load_control(const Arguments& a) {
     if (a.source_control.empty() != a.target_control.empty())
-        throw InputError("a control map has two sides", "give --control-source FILE and --control-target FILE");
+        throw UsageError("a control map has two sides", "give --control-source FILE and --control-target FILE");
     if (a.source_control.empty()) return {};
     return {read_picture(a.source_control).samples, read_picture(a.target_control).samples};
 }
@@ -149,7 +150,7 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
         !a.relight.lights.empty() || !a.relight.lamp_positions.empty() || !a.relight.environments.empty();
     require_outside_payload(a.out);
     if (!a.source.empty() && !a.source_mask.empty())
-        throw InputError("--source-mask goes with plain maps, a session has its own", "leave it out");
+        throw UsageError("--source-mask goes with plain maps, a session has its own", "leave it out");
     // What will be needed after the long work is refused before it.
     relight_options(a.relight);
     require_readable_lights(a.relight);
@@ -218,7 +219,7 @@ void add_transfer_command(CommandLine& line) {
     command.add_option("--target-mask", a->target_mask, "White on the target, for a plain normal map");
     command.add_option("--out", a->out, "Folder for albedo, index, coordinates, normals and relit-*.png")->required();
     command.add_option("--method", a->options.method, "analogies, patchmatch or preview (default: patchmatch)")
-        ->transform(CLI::CheckedTransformer(methods).description("{analogies,patchmatch,preview}"));
+        ->transform(one_of(methods));
     command.add_option("--apply", a->apply, "Other maps of the source, carried over in their own format")
         ->expected(1, -1);
     command.add_option("--control-source", a->source_control, "patchmatch: a drawn guide, 8- or 16-bit PNG or EXR");

@@ -139,18 +139,23 @@ TEST_F(BadPhotographs, TooFewFramesThatAreNotBlack) {
     expect_one_error(darkbox_program({"process", path("s").string()}), "black");
 }
 
-TEST_F(BadPhotographs, ABlackFrameOfTheBall) {
-    const std::string s = ball_session("48,48,40", [](cv::Mat1b& image, std::size_t i) {
-        if (i == 1) image = 0;
-    });
-    expect_one_error(darkbox_program({"calibrate", s}), "p1.png");
+TEST_F(BadPhotographs, AFrameWhoseBallShowsNothingIsLeftOut) {
+    for (const uchar value : {uchar{0}, uchar{255}}) {
+        std::filesystem::remove_all(path("s"));
+        const std::string s = ball_session("48,48,40", [value](cv::Mat1b& image, std::size_t i) {
+            if (i == 1) image = value;
+        });
+        const auto r = darkbox_program({"calibrate", s, "--strict"});
+        EXPECT_EQ(r.status, 3) << r.err;
+        EXPECT_THAT(r.err, HasSubstr("p1.png has no usable highlight"));
+    }
 }
 
-TEST_F(BadPhotographs, AClippedFrameOfTheBall) {
+TEST_F(BadPhotographs, ABallThatShowsTooFewLamps) {
     const std::string s = ball_session("48,48,40", [](cv::Mat1b& image, std::size_t i) {
-        if (i == 1) image = 255;
+        if (i > 1) image = 0;
     });
-    expect_one_error(darkbox_program({"calibrate", s}), "p1.png");
+    expect_one_error(darkbox_program({"calibrate", s}), "p2.png, p3.png");
 }
 
 TEST_F(BadPhotographs, ABallOutsideThePicture) {
@@ -161,8 +166,10 @@ TEST_F(BadPhotographs, ABallOutsideThePicture) {
 
 TEST_F(BadPhotographs, ABallOfNoSize) {
     const std::string s = ball_session("", [](cv::Mat1b&, std::size_t) {});
-    for (const char* ball : {"--ball=48,48,0", "--ball=48,48,-3", "--ball=48,48,nan", "--ball=48,48"})
+    for (const char* ball : {"--ball=48,48,0", "--ball=48,48,-3"})
         expect_one_error(darkbox_program({"calibrate", s, ball}), "ball");
+    for (const char* ball : {"--ball=48,48,nan", "--ball=48,48"})
+        expect_one_error(darkbox_program({"calibrate", s, ball}), "ball", 2);
 }
 
 TEST_F(BadPhotographs, OnePixel) {
