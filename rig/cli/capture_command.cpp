@@ -94,10 +94,10 @@ CommandResult capture_here(const Arguments& a, const WorkContext& work) {
 
 // Through the daemon.
 
-/// Follows one capture from its acceptance to its last event.
-class FollowedCapture {
+/// Follows one job from its acceptance to its last event.
+class FollowedJob {
 public:
-    FollowedCapture(const DaemonClient& client, const EventJson& job, const WorkContext& work)
+    FollowedJob(const DaemonClient& client, const EventJson& job, const WorkContext& work)
         : client_(client), id_(job.at("id")), session_(job.at("session")), first_event_(job.at("event")), work_(work) {}
 
     EventJson end() {
@@ -152,20 +152,57 @@ CaptureOrder order_for(const Arguments& a, const DaemonClient& client) {
     return order;
 }
 
-CommandResult capture_through(const DaemonClient& client, const Arguments& a, const WorkContext& work) {
-    const EventJson job = client.call("POST", "captures", to_json(order_for(a, client)));
-    const EventJson end = FollowedCapture(client, job, work).end();
-    if (end.at("event") == "done")
-        return captured(end.at("folder"), end.at("frames"), end.at("repeated"), end.at("resumed"), end.at("seconds"));
+[[noreturn]] void throw_end(const EventJson& end) {
     const std::string what = end.at("detail");
     const std::string hint = end.at("hint");
     if (end.at("event") == "cancelled") throw Cancelled(what + "; the lamps are dark", hint);
     throw DeviceError(what, hint);
 }
 
+CommandResult capture_through(const DaemonClient& client, const Arguments& a, const WorkContext& work) {
+    const EventJson job = client.call("POST", "captures", to_json(order_for(a, client)));
+    const EventJson end = FollowedJob(client, job, work).end();
+    if (end.at("event") == "done")
+        return captured(end.at("folder"), end.at("frames"), end.at("repeated"), end.at("resumed"), end.at("seconds"));
+    throw_end(end);
+}
+
+/// The alarms of a calibration against the last and the first.
+std::vector<std::string> alarms_of(const EventJson& session) {
+    std::vector<std::string> alarms;
+    for (const EventJson& drift : session.at("drift"))
+        if (const std::string alarm = drift.at("alarm"); !alarm.empty())
+            alarms.push_back(fmt::format("since the {} calibration, {}: {}", drift.at("role").get<std::string>(),
+                                         drift.at("against").get<std::string>(), alarm));
+    return alarms;
+}
+
+/// A capture of the ball and what follows from it: the calibration, compared with earlier ones.
+CommandResult recalibrate(const DaemonClient& client, const WorkContext& work) {
+    const EventJson job = client.call("POST", "jobs", {{"kind", "recalibrate"}});
+    const EventJson captured = FollowedJob(client, job, work).end();
+    if (captured.at("event") != "done") throw_end(captured);
+    const EventJson next = client.call("GET", fmt::format("jobs/{}", captured.at("next").get<std::uint64_t>()));
+    const EventJson calibrated = FollowedJob(client, next, work).end();
+    if (calibrated.at("event") != "done") throw_end(calibrated);
+    const std::string session = captured.at("session");
+    const EventJson stored = client.call("GET", "sessions/" + session);
+    CommandResult result;
+    result.json = {{"session", session}, {"frames", captured.at("frames").get<std::size_t>()}};
+    result.json["drift"] = Json::parse(stored.at("drift").dump());
+    result.warnings = alarms_of(stored);
+    result.text = fmt::format("{}: calibrated; {}", session,
+                              stored.at("drift").empty() ? "the first of this rig"
+                              : result.warnings.empty()  ? "within the thresholds of the last and the first"
+                                                         : "see the alarms");
+    return result;
+}
+
 CommandResult run(const Arguments& a, const WorkContext& work) {
     if (!a.resume.empty() && !(a.out.empty() && a.object.empty()))
         throw InputError("a resumed session keeps its name and its object", "leave out --out and --object");
+    if (a.plan == "recalibrate" && (a.standalone || !a.resume.empty() || !a.out.empty()))
+        throw InputError("--plan recalibrate is darkboxd's to do, as a whole", "leave out the other options");
     if (a.standalone) return capture_here(a, work);
     const DaemonClient client(a.socket.empty() ? default_socket() : a.socket);
     if (!client.answers())
@@ -173,6 +210,7 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
                          "start it (darkboxd --config rig.toml), or capture in this process with --standalone");
     if (!a.rig.empty() || a.simulate > 0)
         throw InputError("darkboxd has its rig already", "leave out --rig and --simulate, or add --standalone");
+    if (a.plan == "recalibrate") return recalibrate(client, work);
     return capture_through(client, a, work);
 }
 
@@ -211,7 +249,7 @@ void add_capture_command(CommandLine& line) {
         ->check(CLI::Range(3, 64))
         ->excludes(rig);
     command.add_option("--object", a->object, "Name of the object");
-    command.add_option("--plan", a->plan, "all, or names of lamps between commas");
+    command.add_option("--plan", a->plan, "all, names of lamps between commas, or recalibrate");
     command
         .add_option("--mode", a->mode, "How fast: settled, predictive or strobed; default: the rig's [capture] mode")
         ->check(CLI::IsMember({"settled", "predictive", "strobed"}));

@@ -13,5 +13,7 @@ int main(int argc, char** argv) {
     darkbox::add_drift_command(line);
     darkbox::add_session_commands(line);
     darkbox::add_rig_commands(line);
+    darkbox::add_ageing_command(line);
+    darkbox::add_doctor_command(line);
     return line.run(argc, argv);
 }

@@ -3,12 +3,10 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <optional>
 
 #include "rig/capture/capture_run.h"
 #include "rig/daemon/client.h"
 #include "rig/daemon/hardware.h"
-#include "rig/daemon/session_folder.h"
 
 namespace darkbox {
 namespace {
@@ -18,7 +16,6 @@ namespace fs = std::filesystem;
 struct Arguments {
     fs::path rig;
     fs::path socket;
-    fs::path folder;
     bool camera = false;
 };
 
@@ -78,43 +75,6 @@ CommandResult rig_check(const Arguments& a) {
     return result;
 }
 
-Json describe(const SessionListing& session) {
-    return {{"name", session.name},       {"state", name(session.state)}, {"object", session.object},
-            {"created", session.created}, {"frames", session.frames},     {"problem", session.problem}};
-}
-
-Json sessions_on_disk(const fs::path& folder) {
-    Json list = Json::array();
-    for (const SessionListing& session : list_sessions(folder)) list.push_back(describe(session));
-    return {{"folder", folder.string()}, {"sessions", list}};
-}
-
-/// Those of the folder that was named; else the daemon's, where one answers; else those of the default folder.
-Json find_sessions(const Arguments& a) {
-    if (!a.folder.empty()) return sessions_on_disk(a.folder);
-    if (const auto socket = a.socket.empty() ? known_socket() : std::optional(a.socket)) {
-        const DaemonClient client(*socket);
-        if (client.answers()) return ask(client, "GET", "sessions");
-    }
-    return sessions_on_disk(default_sessions_folder());
-}
-
-CommandResult sessions(const Arguments& a) {
-    CommandResult result;
-    result.json = find_sessions(a);
-    const auto text = [](const Json& session, const char* key) { return session.value(key, std::string()); };
-    for (const Json& session : result.json.at("sessions")) {
-        result.text +=
-            fmt::format("{:<40} {:<12} {:>4} frames  {:<22} {}\n", text(session, "name"), text(session, "state"),
-                        session.at("frames").get<int>(), text(session, "created"), text(session, "object"));
-        if (const std::string problem = text(session, "problem"); !problem.empty())
-            result.warnings.push_back(fmt::format("{}: {}", text(session, "name"), problem));
-    }
-    if (result.text.empty()) result.text = fmt::format("no sessions in {}\n", text(result.json, "folder"));
-    result.text.pop_back();
-    return result;
-}
-
 using Run = CommandResult (*)(const Arguments&);
 
 struct Added {
@@ -147,12 +107,7 @@ void add_rig_commands(CommandLine& line) {
     add_rig_plan_command(line, rig);
 
     add_lamps_commands(line);
-
-    const auto [list, list_arguments] =
-        add(line, nullptr, "sessions", "The captured sessions", "darkbox sessions --folder sessions", sessions);
-    list.add_option("--socket", list_arguments->socket, "Where darkboxd listens");
-    list.add_option("--folder", list_arguments->folder,
-                    "Where they lie; default: darkboxd's folder when it runs, else $DARKBOX_SESSIONS, or ./sessions");
+    add_catalog_commands(line);
 }
 
 }  // namespace darkbox

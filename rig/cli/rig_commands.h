@@ -11,8 +11,16 @@ namespace darkbox {
 
 /// `darkbox capture`.
 void add_capture_command(CommandLine& line);
-/// `darkbox rig`, `darkbox lamps` and `darkbox sessions`.
+/// `darkbox rig`, and the commands below.
 void add_rig_commands(CommandLine& line);
+
+/// `darkbox sessions`, `darkbox calibrations` and `darkbox jobs`.
+void add_catalog_commands(CommandLine& line);
+
+/// `darkbox doctor`.
+void add_doctor_command(CommandLine& line);
+/// `darkbox ageing`.
+void add_ageing_command(CommandLine& line);
 
 /// `darkbox lamps`.
 void add_lamps_commands(CommandLine& line);

@@ -174,6 +174,8 @@ ApiResponse Api::answer(const ApiRequest& request) const noexcept {
         response = problem(404, error.what(), error.hint());
     } catch (const Refused& error) {
         response = problem(409, error.what(), error.hint());
+    } catch (const NoRoom& error) {
+        response = problem(507, error.what(), error.hint());
     } catch (const InputError& error) {
         response = problem(400, error.what(), error.hint());
     } catch (const Error& error) {

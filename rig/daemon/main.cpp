@@ -1,6 +1,8 @@
 #include <fmt/format.h>
+#include <grp.h>
 
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
@@ -27,6 +29,7 @@ struct DaemonOptions {
     int lamps = 12;
     fs::path socket;
     fs::path sessions;
+    std::string listen;
 };
 
 RigDescription load(const DaemonOptions& options) {
@@ -44,25 +47,70 @@ fs::path first_given(const fs::path& option, const fs::path& configured, fs::pat
 /// Never throws, unlike fmt::print: stderr may be closed.
 void put(const std::string& text) { std::fputs(text.c_str(), stderr); }
 
+PeerAccess peers_of(const std::string& group) {
+    if (group.empty()) return {};
+    const struct group* entry = ::getgrnam(group.c_str());
+    if (entry == nullptr)
+        throw InputError(fmt::format("there is no group \"{}\"", group), "make it: groupadd --system " + group);
+    return {.group = entry->gr_gid};
+}
+
+/// What the capture writes, at most: every plane of every frame in 16 bits, and a bit for the papers. A camera that has
+/// not said its size yet is taken for a large one.
+std::uint64_t capture_bytes(const RigDescription& rig, const CaptureOrder& order) {
+    constexpr std::uint64_t large = 24'000'000;  // pixels
+    constexpr std::uint64_t papers = 1 << 20;
+    const bool simulated = rig.camera.driver == "sim";
+    const auto width = static_cast<std::uint64_t>(simulated ? rig.sim.width : rig.camera.width);
+    const auto height = static_cast<std::uint64_t>(simulated ? rig.sim.height : rig.camera.height);
+    const std::uint64_t pixels = width * height > 0 ? width * height : large;
+    const std::uint64_t planes = rig.camera.format.starts_with("RGB") || rig.camera.format.starts_with("BGR") ? 3 : 1;
+    const std::size_t lamps = order.lamps.empty() ? rig.lamps.size() : order.lamps.size();
+    return (lamps + 2) * pixels * planes * 2 + papers;
+}
+
+/// "127.0.0.1:7640" or "[::1]:7640"
+TcpListen listen_from(const std::string& text, const fs::path& token_file) {
+    const auto colon = text.rfind(':');
+    TcpListen listen;
+    unsigned port = 0;
+    const char* end = text.data() + text.size();
+    const bool good = colon != text.npos && std::from_chars(text.data() + colon + 1, end, port).ptr == end &&
+                      colon + 1 < text.size() && port <= 65535;
+    if (!good) throw InputError(fmt::format("\"{}\" is not an address and a port", text), "write 127.0.0.1:7640");
+    listen.address = text.substr(0, colon);
+    if (listen.address.starts_with('[') && listen.address.ends_with(']'))
+        listen.address = listen.address.substr(1, listen.address.size() - 2);
+    listen.port = static_cast<unsigned short>(port);
+    listen.token = token_in(token_file);
+    return listen;
+}
+
 /// Everything the daemon is, wired together.
 class Daemon {
 public:
-    Daemon(RigDescription rig, const fs::path& socket, const fs::path& sessions)
+    Daemon(RigDescription rig, const HttpServerOptions& http, const fs::path& sessions)
         : rig_(std::move(rig)),
           hardware_(rig_),
           signals_(io_, SIGINT, SIGTERM, SIGHUP),
           watchdog_(io_),
           leave_(io_),
-          server_(
-              io_, server_options(socket), [this](const ApiRequest& request) { return api_->answer(request); }, log_) {
+          server_(io_, http, [this](const ApiRequest& request) { return api_->answer(request); }, log_, metrics_) {
         fs::create_directories(sessions);
         ServiceOptions options{.sessions = sessions};
+        options.bytes_needed = [this](const CaptureOrder& order) { return capture_bytes(rig_, order); };
         options.run_processing = processing_by(darkbox_beside_this_program());
         service_.emplace([this] { return hardware_.open(); }, options, log_);
         api_.emplace(rig_, *service_, metrics_);
         await_signal();
         feed_watchdog();
     }
+
+    Daemon(const Daemon&) = delete;
+    Daemon& operator=(const Daemon&) = delete;
+    ~Daemon() { server_.release_handler(); }
+
+    unsigned short port() const { return server_.port(); }
 
     void run() {
         notify_ready();
@@ -72,12 +120,6 @@ public:
     std::optional<std::string> stop() { return service_->stop(); }
 
 private:
-    static HttpServerOptions server_options(const fs::path& socket) {
-        HttpServerOptions options;
-        options.socket = socket;
-        return options;
-    }
-
     /// The first signal lets the capture end in the dark and its listeners hear of it; the second does not wait for
     /// them.
     void await_signal() {
@@ -122,8 +164,8 @@ private:
     asio::steady_timer watchdog_;
     asio::steady_timer leave_;
     bool stopping_ = false;
-    HttpServer server_;
     Metrics metrics_;
+    HttpServer server_;
     std::optional<Service> service_;
     std::optional<Api> api_;
 };
@@ -132,10 +174,20 @@ int run(const DaemonOptions& options) {
     RigDescription rig = load(options);
     const fs::path socket = first_given(options.socket, rig.socket, default_socket);
     const fs::path sessions = first_given(options.sessions, rig.sessions_folder, default_sessions_folder);
+    HttpServerOptions http;
+    http.socket = socket;
+    http.peers = peers_of(rig.socket_group);
+    const std::string listen = options.listen.empty() ? rig.listen : options.listen;
+    const fs::path token_file =
+        rig.token_file.empty() ? fs::absolute(socket).parent_path() / "darkbox.token" : rig.token_file;
     put(fmt::format("darkboxd: rig {}, {} lamps, socket {}, sessions {}\n", rig.name, rig.lamps.size(), socket.string(),
                     sessions.string()));
+    if (!listen.empty()) http.tcp = listen_from(listen, token_file);
     const auto not_dark = [&] {
-        Daemon daemon(std::move(rig), socket, sessions);
+        Daemon daemon(std::move(rig), http, sessions);
+        if (http.tcp)
+            put(fmt::format("darkboxd: http://{}:{}, token in {}\n", http.tcp->address, daemon.port(),
+                            token_file.string()));
         daemon.run();
         return daemon.stop();
     }();
@@ -158,6 +210,8 @@ int parse_and_run(int argc, char** argv) {
                    "Where to listen; else [api] socket, $DARKBOX_SOCKET, $XDG_RUNTIME_DIR/darkbox.sock");
     app.add_option("--sessions", options.sessions,
                    "The folder of the sessions; else [api] sessions, $DARKBOX_SESSIONS, ./sessions");
+    app.add_option("--listen", options.listen,
+                   "Listen on this loopback address, too (127.0.0.1:7640), for who has the token; else [api] listen");
     app.footer("Example:\n  darkboxd --simulate --lamps 12 --socket /tmp/darkbox.sock --sessions ./sessions");
     try {
         app.parse(argc, argv);

@@ -46,6 +46,7 @@ std::string state_hint(ServiceState state, const std::string& problem) {
 }  // namespace
 
 Refused::~Refused() = default;
+NoRoom::~NoRoom() = default;
 
 std::string_view name(ServiceState state) {
     switch (state) {
@@ -111,11 +112,25 @@ CaptureRequest Service::request_for(const CaptureOrder& order, int attempt) cons
     return request;
 }
 
+void Service::require_room(const CaptureOrder& order) const {
+    if (!options_.bytes_needed) return;
+    constexpr double mebibyte = 1 << 20;
+    const auto needed = options_.bytes_needed(order) + options_.bytes_kept_free;
+    std::error_code error;
+    const auto free = std::filesystem::space(options_.sessions, error).available;
+    if (error || free >= needed) return;
+    throw NoRoom(fmt::format("the capture could not end: it needs up to {:.0f} MiB in {}, where {:.0f} MiB are free",
+                             static_cast<double>(needed) / mebibyte, options_.sessions.string(),
+                             static_cast<double>(free) / mebibyte),
+                 "free space there: darkbox sessions lists what may be archived elsewhere");
+}
+
 Job Service::start_capture(const CaptureOrder& order) {
     const std::scoped_lock lock(mutex_);
     if (stopping_) throw Refused("darkboxd is shutting down", "start it again");
     if (state_ != ServiceState::idle) refuse(state_, problem_);
     const CaptureRequest request = request_for(order, 1);
+    require_room(order);
     Job job;
     job.session = request.folder.filename().string();
     job.state = JobState::running;
@@ -132,6 +147,8 @@ Job Service::enqueue(Job job) {
     const std::scoped_lock lock(mutex_);
     if (stopping_) throw Refused("darkboxd is shutting down", "start it again");
     if (lane_of(job.kind) == Lane::rig) {
+        if (job.kind == JobKind::recalibrate && !job.orders.contains("object") && !job.orders.contains("resume"))
+            job.orders["object"] = "recalibration";
         (void)request_for(capture_order_from(job.orders), 1);
     } else if (!options_.run_processing) {
         throw Refused("this darkboxd does not process", "process with the command: darkbox process SESSION");
@@ -211,6 +228,7 @@ void Service::capture(Job& job, const WorkContext& work) {
     // A session of its own that start_capture() has just named is not there yet; after a crash it may be.
     const CaptureRequest request = request_for(order, job.attempts);
     job.session = request.folder.filename().string();
+    require_room(order);
     book_.set_session(job.id, job.session);
     job.outcome = rig_->capture(request, work);
     frames_captured_ += job.outcome.frames;

@@ -49,8 +49,11 @@ public:
 struct ServiceOptions {
     std::filesystem::path sessions = "sessions";  ///< the folder that holds the sessions
     std::chrono::milliseconds reopen_every{2000};
-    std::size_t jobs_kept = 1000;       ///< finished jobs that can still be asked for
-    RunProcessing run_processing = {};  ///< empty: there is none, and such jobs are refused
+    std::size_t jobs_kept = 1000;  ///< finished jobs that can still be asked for
+    /// Bytes that a capture of these orders will write, at most; empty: not known, and nothing is refused for it.
+    std::function<std::uint64_t(const CaptureOrder&)> bytes_needed = {};
+    std::uint64_t bytes_kept_free = 256ULL << 20;  ///< on the sessions' disk, beyond what a capture needs
+    RunProcessing run_processing = {};             ///< empty: there is none, and such jobs are refused
 };
 
 struct ServiceStatus {
@@ -60,6 +63,13 @@ struct ServiceStatus {
     std::size_t queued = 0;      ///< captures that wait
     std::size_t processing = 0;  ///< processing jobs, running or waiting
     std::uint64_t last_event = 0;
+};
+
+/// What is asked cannot end well, so it does not begin: the disk is too full for it.
+class NoRoom : public Error {
+public:
+    using Error::Error;
+    ~NoRoom() override;
 };
 
 /// The daemon's state machine. One thread of its own drives the rig; it holds the single place that catches, and
@@ -75,7 +85,7 @@ public:
     ~Service();
 
     ServiceStatus status() const;
-    /// Throws Refused, NotFound, or InputError for an order that makes no sense.
+    /// Throws Refused, NotFound, NoRoom, or InputError for an order that makes no sense.
     Job start_capture(const CaptureOrder& order);
     /// For later, in the order of asking: a capture begins once the rig is idle. `job` says kind, session and orders.
     /// Throws as start_capture() does.
@@ -109,6 +119,7 @@ private:
     void run(const std::stop_token& stop);
     bool open_rig(const std::stop_token& stop);
     std::optional<Task> next_task(const std::stop_token& stop);
+    void require_room(const CaptureOrder& order) const;
     void perform(const Job& job);
     void capture(Job& job, const WorkContext& work);
     void perform(Darken);

@@ -5,6 +5,7 @@
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/un.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <chrono>
@@ -61,7 +62,8 @@ void check(const boost::system::error_code& error, const char* call, const fs::p
 
 }  // namespace
 
-SocketFile::SocketFile(asio::io_context& io, fs::path path) : path_(fs::absolute(path)), acceptor_(io) {
+SocketFile::SocketFile(asio::io_context& io, fs::path path, std::optional<gid_t> group)
+    : path_(fs::absolute(path)), acceptor_(io) {
     if (path_.string().size() > longest_path)
         throw InputError(fmt::format("the socket's path {} has {} bytes; allowed: up to {}", path_.string(),
                                      path_.string().size(), longest_path),
@@ -77,6 +79,10 @@ SocketFile::SocketFile(asio::io_context& io, fs::path path) : path_(fs::absolute
     if (::fchmod(acceptor_.native_handle(), owner_only) != 0) throw_errno("fchmod", path_.string(), errno);
     acceptor_.bind(UnixProtocol::endpoint(path_.string()), error);
     check(error, "bind", path_);
+    if (group) {
+        if (::lchown(path_.c_str(), static_cast<uid_t>(-1), *group) != 0) throw_errno("chown", path_.string(), errno);
+        if (::chmod(path_.c_str(), owner_only | S_IRGRP | S_IWGRP) != 0) throw_errno("chmod", path_.string(), errno);
+    }
     acceptor_.listen(asio::socket_base::max_listen_connections, error);
     check(error, "listen", path_);
     struct stat ours{};

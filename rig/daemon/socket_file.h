@@ -3,18 +3,20 @@
 #include <sys/types.h>
 
 #include <filesystem>
+#include <optional>
 
 #include "rig/daemon/asio.h"
 
 namespace darkbox {
 
-/// A Unix socket in the file system that listens; only this user may connect (mode 0600 from the first moment on).
+/// A Unix socket in the file system that listens; only this user, and the group where one is given, may connect (by
+/// its mode from the first moment on).
 /// The destructor removes the file if it is still its own. Thread-compatible.
 class SocketFile {
 public:
     /// Replaces what a dead daemon left behind. Throws InputError when a live one answers there, or when something
     /// else than a socket is in the way; DeviceError when the system refuses.
-    SocketFile(asio::io_context& io, std::filesystem::path path);
+    SocketFile(asio::io_context& io, std::filesystem::path path, std::optional<gid_t> group = std::nullopt);
     SocketFile(const SocketFile&) = delete;
     SocketFile& operator=(const SocketFile&) = delete;
     ~SocketFile();

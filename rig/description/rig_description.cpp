@@ -345,9 +345,12 @@ SimDescription read_sim(TomlSection& section) {
 }
 
 void read_api(TomlSection& section, RigDescription& rig) {
-    section.allow({"sessions", "socket"});
+    section.allow({"sessions", "socket", "group", "listen", "token_file"});
     rig.sessions_folder = section.text("sessions").value_or("");
     rig.socket = section.text("socket").value_or("");
+    rig.socket_group = section.text("group").value_or("");
+    rig.listen = section.text("listen").value_or("");
+    rig.token_file = section.text("token_file").value_or("");
 }
 
 /// The simulator draws from where the description says that the camera is, and the description of a perspective scene

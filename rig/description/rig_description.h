@@ -106,6 +106,9 @@ struct RigDescription {
     SimDescription sim;
     std::filesystem::path sessions_folder;  ///< [api] sessions; empty = the caller's default
     std::filesystem::path socket;           ///< [api] socket; empty = the caller's default
+    std::string socket_group;               ///< [api] group: whose members may use the socket; empty = only the owner
+    std::string listen;                     ///< [api] listen: "127.0.0.1:7640"; empty = no TCP
+    std::filesystem::path token_file;       ///< [api] token_file, for TCP; empty = beside the socket
     std::string toml;                       ///< the text it came from, byte for byte
 };
 

@@ -36,7 +36,8 @@ protected:
         ASSERT_TRUE(reaches(*service_, ServiceState::idle));
     }
     void serve() {
-        server_.emplace(io_, options_, [this](const ApiRequest& request) { return api_->answer(request); }, log_);
+        server_.emplace(
+            io_, options_, [this](const ApiRequest& request) { return api_->answer(request); }, log_, metrics_);
         loop_ = std::jthread([this] { io_.run(); });
     }
     void TearDown() override {

@@ -1,0 +1,204 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <optional>
+
+#include "rig/cli/rig_commands.h"
+#include "rig/daemon/api_words.h"
+#include "rig/daemon/client.h"
+#include "rig/daemon/folder_lock.h"
+
+namespace darkbox {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Arguments {
+    fs::path socket;
+    fs::path folder;
+    bool rebuild = false;
+    std::uint64_t id = 0;
+    std::string format;
+};
+
+std::string text(const Json& json, const char* key) { return json.value(key, std::string()); }
+
+DaemonClient client_for(const Arguments& a) { return DaemonClient(a.socket.empty() ? default_socket() : a.socket); }
+
+/// The daemon's answer, in the order in which Json prints.
+Json ask(const DaemonClient& client, const std::string& method, const std::string& target) {
+    return Json::parse(client.call(method, target).dump());
+}
+
+/// Page after page of a list, as one.
+Json ask_for_all(const DaemonClient& client, const std::string& list) {
+    Json whole = ask(client, "GET", list + "?limit=1000");
+    for (std::string next = text(whole, "next"); !next.empty();) {
+        const Json page = ask(client, "GET", fmt::format("{}?limit=1000&after={}", list, next));
+        for (const Json& item : page.at(list)) whole.at(list).push_back(item);
+        next = text(page, "next");
+    }
+    whole.erase("next");
+    return whole;
+}
+
+/// The daemon to ask: none when a folder is named, or none answers.
+std::optional<DaemonClient> daemon_of(const Arguments& a) {
+    if (!a.folder.empty()) return std::nullopt;
+    const auto socket = a.socket.empty() ? known_socket() : std::optional(a.socket);
+    if (!socket || !DaemonClient(*socket).answers()) return std::nullopt;
+    return DaemonClient(*socket);
+}
+
+fs::path folder_of(const Arguments& a) { return a.folder.empty() ? default_sessions_folder() : a.folder; }
+
+Json describe(const SessionListing& session) {
+    return {{"name", session.name},       {"state", name(session.state)}, {"object", session.object},
+            {"created", session.created}, {"frames", session.frames},     {"problem", session.problem}};
+}
+
+Json sessions_on_disk(const fs::path& folder) {
+    Json list = Json::array();
+    for (const SessionListing& session : list_sessions(folder)) list.push_back(describe(session));
+    return {{"folder", folder.string()}, {"sessions", list}};
+}
+
+CommandResult rebuild(const Arguments& a) {
+    CommandResult result;
+    if (const auto client = daemon_of(a)) {
+        result.json = ask(*client, "POST", "catalog/rebuild");
+    } else {
+        const fs::path folder = folder_of(a);
+        if (!fs::is_directory(folder))
+            throw InputError(fmt::format("there is no folder {}", folder.string()), "give --folder");
+        const FolderLock lock(folder / Catalog::own_folder_name);
+        Catalog catalog(folder);
+        catalog.rebuild();
+        result.json = {{"sessions", catalog.session_count()}};
+    }
+    result.text = fmt::format("read again: {} sessions", result.json.at("sessions").get<std::size_t>());
+    return result;
+}
+
+CommandResult sessions(const Arguments& a) {
+    if (a.rebuild) return rebuild(a);
+    CommandResult result;
+    const auto client = daemon_of(a);
+    result.json = client ? ask_for_all(*client, "sessions") : sessions_on_disk(folder_of(a));
+    for (const Json& session : result.json.at("sessions")) {
+        result.text +=
+            fmt::format("{:<40} {:<12} {:>4} frames  {:<22} {}\n", text(session, "name"), text(session, "state"),
+                        session.at("frames").get<int>(), text(session, "created"), text(session, "object"));
+        if (const std::string problem = text(session, "problem"); !problem.empty())
+            result.warnings.push_back(fmt::format("{}: {}", text(session, "name"), problem));
+    }
+    if (result.text.empty()) result.text = fmt::format("no sessions in {}\n", text(result.json, "folder"));
+    result.text.pop_back();
+    return result;
+}
+
+/// Read off the sessions themselves; nothing is written to their folder.
+Json calibrations_on_disk(const fs::path& folder) {
+    Catalog catalog(folder, Catalog::Place::in_memory);
+    catalog.refresh();
+    Json list = Json::array();
+    for (const CatalogCalibration& calibration : catalog.calibrations({.limit = 1'000'000})) {
+        Json entry = Json::parse(to_json(calibration).dump());
+        entry["drift"] = Json::array();
+        for (const CatalogDrift& drift : catalog.drifts(calibration.session))
+            entry["drift"].push_back(Json::parse(to_json(drift).dump()));
+        list.push_back(std::move(entry));
+    }
+    return {{"calibrations", list}};
+}
+
+std::string since(const Json& calibration, const std::string& role, std::vector<std::string>& alarms) {
+    for (const Json& drift : calibration.at("drift")) {
+        if (text(drift, "role") != role) continue;
+        const std::string alarm = text(drift, "alarm");
+        if (!alarm.empty() && role == "last")
+            alarms.push_back(
+                fmt::format("{} since {}: {}", text(calibration, "session"), text(drift, "against"), alarm));
+        if (!alarm.empty()) return "alarm";
+        return drift.at("steady").get<bool>() ? "steady" : "drifts";
+    }
+    return "-";
+}
+
+CommandResult calibrations(const Arguments& a) {
+    CommandResult result;
+    const auto client = daemon_of(a);
+    result.json = client ? ask_for_all(*client, "calibrations") : calibrations_on_disk(folder_of(a));
+    result.text = fmt::format("{:<36} {:<25} {:>9} {:>9} {:>8}  {:<8} {}\n", "session", "made", "lamps", "condition",
+                              "sigma °", "last", "first");
+    for (const Json& c : result.json.at("calibrations")) {
+        const std::string used = fmt::format("{}/{}", c.at("used").get<int>(), c.at("lamps").get<int>());
+        const std::string last = since(c, "last", result.warnings);
+        result.text += fmt::format("{:<36} {:<25} {:>9} {:>9.2f} {:>8.3f}  {:<8} {}\n", text(c, "session"),
+                                   text(c, "created"), used, c.at("condition_number").get<double>(),
+                                   c.at("sigma_deg").get<double>(), last, since(c, "first", result.warnings));
+    }
+    if (result.json.at("calibrations").empty()) result.text = "no calibrations\n";
+    result.text.pop_back();
+    return result;
+}
+
+CommandResult jobs(const Arguments& a) {
+    CommandResult result;
+    result.json = ask(client_for(a), "GET", "jobs");
+    for (const Json& job : result.json.at("jobs")) {
+        const Json& progress = job.at("progress");
+        result.text +=
+            fmt::format("{:>6} {:<12} {:<10} {:<36} {}/{} {}\n", job.at("id").get<std::uint64_t>(), text(job, "kind"),
+                        text(job, "state"), text(job, "session"), progress.at("done").get<std::size_t>(),
+                        progress.at("total").get<std::size_t>(), text(job, "detail"));
+    }
+    if (result.text.empty()) result.text = "no jobs yet\n";
+    result.text.pop_back();
+    return result;
+}
+
+CommandResult cancel_job(const Arguments& a) {
+    CommandResult result;
+    result.json = ask(client_for(a), "DELETE", fmt::format("jobs/{}", a.id));
+    result.text = fmt::format("job {} is {}", a.id, text(result.json, "state"));
+    return result;
+}
+
+using Run = CommandResult (*)(const Arguments&);
+
+struct Added {
+    CLI::App& command;
+    std::shared_ptr<Arguments> arguments;
+};
+
+Added add(CommandLine& line, const char* name, const char* description, const char* example, Run run,
+          CLI::App* group = nullptr) {
+    const auto a = std::make_shared<Arguments>();
+    CLI::App& command = line.add(name, description, example, [a, run](const WorkContext&) { return run(*a); }, group);
+    command.add_option("--socket", a->socket, "Where darkboxd listens");
+    return {command, a};
+}
+
+void take_folder(const Added& added) {
+    added.command.add_option(
+        "--folder", added.arguments->folder,
+        "Where the sessions lie; default: darkboxd's folder when it runs, else $DARKBOX_SESSIONS, or ./sessions");
+}
+
+}  // namespace
+
+void add_catalog_commands(CommandLine& line) {
+    const Added list = add(line, "sessions", "The captured sessions", "darkbox sessions --folder sessions", sessions);
+    take_folder(list);
+    list.command.add_flag("--rebuild", list.arguments->rebuild, "Make the catalogue again from what is on disk");
+    take_folder(add(line, "calibrations", "Every calibration, and what moved since the last and the first one",
+                    "darkbox calibrations", calibrations));
+
+    CLI::App& group = line.add_group("jobs", "What darkboxd was asked to do");
+    add(line, "list", "The last hundred, newest first", "darkbox jobs list", jobs, &group);
+    const Added cancel = add(line, "cancel", "Ask a job to stop", "darkbox jobs cancel 12", cancel_job, &group);
+    cancel.command.add_option("id", cancel.arguments->id, "The job's number")->required();
+}
+
+}  // namespace darkbox

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rig/description/rig_description.h"
+
+namespace darkbox {
+
+enum class Verdict { good, warning, bad };
+
+/// What `darkbox doctor` has to say about one thing.
+struct Diagnosis {
+    std::string subject;
+    Verdict verdict = Verdict::good;
+    std::string found;
+    std::string remedy = {};  ///< exactly what to do; empty when there is nothing to do
+};
+using Diagnoses = std::vector<Diagnosis>;
+
+/// A file that may or may not be there and open to us.
+enum class Access { open, absent, denied };
+
+struct GpioLineSeen {
+    std::string name;
+    std::string holder = {};  ///< empty: free
+};
+struct GpioChipSeen {
+    std::filesystem::path device;
+    Access access = Access::open;
+    std::string label = {};
+    std::vector<GpioLineSeen> lines = {};
+};
+
+/// What the machine shows, gathered apart from what is made of it.
+struct MachineSeen {
+    std::string user;
+    std::vector<std::string> groups;
+    std::vector<GpioChipSeen> chips;
+    Access camera = Access::absent;
+    std::vector<std::filesystem::path> cameras;  ///< by their stable names
+    std::string camera_group = "video";
+    bool udev_rules = false;
+};
+MachineSeen look_at_machine(const RigDescription& rig);
+
+Diagnoses diagnose_camera(const RigDescription& rig, const MachineSeen& machine);
+Diagnoses diagnose_lamps(const RigDescription& rig, const MachineSeen& machine);
+
+/// Writes and flushes a file there, and removes it: whether that works, and how fast.
+Diagnoses diagnose_disk(const RigDescription& rig, const std::filesystem::path& sessions);
+
+}  // namespace darkbox

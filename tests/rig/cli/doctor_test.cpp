@@ -1,0 +1,121 @@
+#include "rig/cli/doctor.h"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+#include "tests/support/test_data.h"
+
+namespace darkbox {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+RigDescription gpio_rig() {
+    RigDescription rig;
+    rig.camera.driver = "v4l2";
+    rig.camera.device = "usb-ACME_Camera-video-index0";
+    rig.lamps_driver = "gpio";
+    rig.gpio.chip = "board";
+    for (const char* line : {"GPIO5", "2"}) {
+        LampDescription lamp;
+        lamp.name = std::string("lamp on ") + line;
+        lamp.line = line;
+        rig.lamps.push_back(lamp);
+    }
+    return rig;
+}
+
+MachineSeen good_machine() {
+    return {.user = "eva",
+            .groups = {"eva", "video"},
+            .chips = {{.device = "/dev/gpiochip0", .label = "board", .lines = {{"GPIO3"}, {"GPIO5"}, {""}}}},
+            .camera = Access::open,
+            .cameras = {"/dev/v4l/by-id/usb-ACME_Camera-video-index0"},
+            .camera_group = "video",
+            .udev_rules = true};
+}
+
+/// The one thing that is wrong.
+Diagnosis only_bad(const Diagnoses& all) {
+    Diagnosis found;
+    int count = 0;
+    for (const Diagnosis& d : all) {
+        if (d.verdict != Verdict::bad) continue;
+        found = d;
+        ++count;
+    }
+    EXPECT_EQ(count, 1);
+    EXPECT_FALSE(found.remedy.empty());
+    return found;
+}
+
+TEST(Doctor, FindsNothingWrongWithAGoodMachine) {
+    for (const Diagnosis& d : diagnose_camera(gpio_rig(), good_machine())) EXPECT_EQ(d.verdict, Verdict::good);
+    for (const Diagnosis& d : diagnose_lamps(gpio_rig(), good_machine()))
+        EXPECT_EQ(d.verdict, Verdict::good) << d.found;
+}
+
+TEST(Doctor, SaysWhatToDoWithoutACamera) {
+    MachineSeen machine = good_machine();
+    machine.camera = Access::absent;
+    EXPECT_THAT(only_bad(diagnose_camera(gpio_rig(), machine)).remedy, HasSubstr("/dev/v4l/by-id/usb-ACME_Camera"));
+    machine.cameras.clear();
+    const Diagnosis none = only_bad(diagnose_camera(gpio_rig(), machine));
+    EXPECT_THAT(none.found, HasSubstr("no camera is plugged in"));
+    EXPECT_THAT(none.remedy, HasSubstr("plug it in"));
+}
+
+TEST(Doctor, SaysWhatToDoWithoutPermission) {
+    MachineSeen machine = good_machine();
+    machine.groups = {"eva"};
+    machine.camera = Access::denied;
+    EXPECT_THAT(only_bad(diagnose_camera(gpio_rig(), machine)).remedy, HasSubstr("usermod -aG video eva"));
+    machine.chips = {{.device = "/dev/gpiochip0", .access = Access::denied}};
+    const Diagnosis denied = only_bad(diagnose_lamps(gpio_rig(), machine));
+    EXPECT_THAT(denied.found, HasSubstr("eva may not open /dev/gpiochip0"));
+    EXPECT_THAT(denied.remedy, HasSubstr("usermod -aG darkbox eva"));
+    machine.udev_rules = false;
+    EXPECT_THAT(only_bad(diagnose_lamps(gpio_rig(), machine)).remedy, HasSubstr("darkbox-daemon"));
+}
+
+TEST(Doctor, SaysWhoHoldsALine) {
+    MachineSeen machine = good_machine();
+    machine.chips[0].lines[1].holder = "blinky";
+    const Diagnosis busy = only_bad(diagnose_lamps(gpio_rig(), machine));
+    EXPECT_THAT(busy.subject, HasSubstr("GPIO5"));
+    EXPECT_THAT(busy.found, HasSubstr("blinky"));
+    EXPECT_THAT(busy.remedy, HasSubstr("fuser -v /dev/gpiochip0"));
+    machine.chips[0].lines[1].holder = "darkbox lamps";
+    for (const Diagnosis& d : diagnose_lamps(gpio_rig(), machine)) EXPECT_EQ(d.verdict, Verdict::good);
+}
+
+TEST(Doctor, KnowsChipsAndLinesThatAreNotThere) {
+    MachineSeen machine = good_machine();
+    machine.chips[0].label = "another";
+    EXPECT_THAT(only_bad(diagnose_lamps(gpio_rig(), machine)).remedy, HasSubstr("another"));
+    machine.chips.clear();
+    EXPECT_THAT(only_bad(diagnose_lamps(gpio_rig(), machine)).found, HasSubstr("no GPIO chip"));
+    machine = good_machine();
+    machine.chips[0].lines.resize(2);
+    EXPECT_THAT(only_bad(diagnose_lamps(gpio_rig(), machine)).subject, HasSubstr("line 2"));
+}
+
+TEST(Doctor, MeasuresTheDisk) {
+    const test::TemporaryFolder folder;
+    const Diagnoses good = diagnose_disk(gpio_rig(), folder.path() / "sessions");
+    EXPECT_EQ(good.front().verdict, Verdict::good);
+    EXPECT_THAT(good.front().found, HasSubstr("MB/s"));
+    EXPECT_TRUE(fs::is_empty(folder.path() / "sessions"));
+    RigDescription fast = gpio_rig();
+    fast.camera.width = fast.camera.height = 100'000;
+    fast.camera.frame_rate = 1000;
+    const Diagnoses slow = diagnose_disk(fast, folder.path() / "sessions");
+    EXPECT_EQ(slow.at(1).verdict, Verdict::warning);
+    std::ofstream(folder.path() / "file") << "";
+    EXPECT_EQ(diagnose_disk(gpio_rig(), folder.path() / "file").front().verdict, Verdict::bad);
+}
+
+}  // namespace
+}  // namespace darkbox
