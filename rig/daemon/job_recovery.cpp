@@ -73,7 +73,8 @@ Job after_a_crash(Job job, const fs::path& sessions) {
         return finished(std::move(job), sessions / job.session);
     if (job.attempts >= most_attempts) return failed(std::move(job));
     job.state = JobState::queued;
-    return captures ? resumed(std::move(job), sessions) : job;
+    if (!captures) return job;
+    return resumed(std::move(job), sessions);
 }
 
 }  // namespace darkbox

@@ -44,16 +44,19 @@ Pipe make_pipe() {
 }
 
 /// In the child, between fork and exec, where only what is safe in a signal handler may be called.
+/// The daemon's descriptors go first, while this still runs as fast as the daemon: in the idle class a killed process
+/// can take seconds to end on a busy machine, and a restarted daemon would find socket and lock still held.
 [[noreturn]] void become(char* const* arguments, int out, int err, pid_t parent) {
+    const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+    ::dup2(nothing, STDIN_FILENO);
+    ::dup2(out, STDOUT_FILENO);
+    ::dup2(err, STDERR_FILENO);
+    ::close_range(STDERR_FILENO + 1, ~0U, 0);
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != parent) ::_exit(127);
     const sched_param none{};
     ::sched_setscheduler(0, SCHED_IDLE, &none);
     ::syscall(SYS_ioprio_set, ioprio_of_process, 0, ioprio_idle);
-    const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
-    ::dup2(nothing, STDIN_FILENO);
-    ::dup2(out, STDOUT_FILENO);
-    ::dup2(err, STDERR_FILENO);
     sigset_t all;
     ::sigfillset(&all);
     ::sigprocmask(SIG_UNBLOCK, &all, nullptr);

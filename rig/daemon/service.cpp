@@ -206,19 +206,30 @@ bool Service::open_rig(const std::stop_token& stop) {
 std::optional<Service::Task> Service::next_task(const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
     const auto may_take = [this] { return state_ == ServiceState::idle && !stopping_ && book_.has_queued(Lane::rig); };
-    wake_.wait(lock, stop, [&] { return !tasks_.empty() || may_take(); });
-    // A capture that was accepted still ends as a job does, cancelled at once, so that its listeners hear of it.
-    if (!tasks_.empty()) {
-        Task task = std::move(tasks_.front());
-        tasks_.pop_front();
-        return task;
+    while (true) {
+        wake_.wait(lock, stop, [&] { return !tasks_.empty() || may_take(); });
+        // A capture that was accepted still ends as a job does, cancelled at once, so that its listeners hear of it.
+        if (!tasks_.empty()) {
+            Task task = std::move(tasks_.front());
+            tasks_.pop_front();
+            return task;
+        }
+        if (!may_take()) return std::nullopt;
+        if (auto job = take_queued()) return std::move(*job);
+        // A disk that refuses to keep that the job begins may take it in a moment.
+        wake_.wait_for(lock, stop, options_.reopen_every, [this] { return !tasks_.empty(); });
     }
-    if (!may_take()) return std::nullopt;
-    auto job = book_.take(Lane::rig);
+}
+
+/// With mutex_ held.
+std::optional<Job> Service::take_queued() {
+    std::optional<Job> job;
+    if (const auto failure = attempt([&] { job = book_.take(Lane::rig); }))
+        log_.publish("problem", {{"detail", failure->what}, {"hint", failure->hint}});
     if (!job) return std::nullopt;
     running_ = job->id;
     enter(ServiceState::busy, "");
-    return std::move(*job);
+    return job;
 }
 
 void Service::capture(Job& job, const WorkContext& work) {

@@ -119,6 +119,7 @@ private:
     void run(const std::stop_token& stop);
     bool open_rig(const std::stop_token& stop);
     std::optional<Task> next_task(const std::stop_token& stop);
+    std::optional<Job> take_queued();
     void require_room(const CaptureOrder& order) const;
     void perform(const Job& job);
     void capture(Job& job, const WorkContext& work);
