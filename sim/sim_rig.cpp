@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "acquisition/frame/error.h"
 #include "sim/scenes.h"
 #include "sim/truth.h"
@@ -52,6 +54,16 @@ SimRig SimRig::make(const RigDescription& rig, const FaultPlan& faults) {
     LampWitness& witness = result.seen_ ? static_cast<LampWitness&>(*result.seen_) : *result.lamps_;
     result.camera_ = std::make_unique<SimCamera>(*result.scene_, witness, *result.clock_, options);
     return result;
+}
+
+SimRig& SimRig::operator=(SimRig&& other) noexcept {
+    camera_.reset();  // first: it holds on to the lamps it strobes, and to all else
+    scene_ = std::move(other.scene_);
+    clock_ = std::move(other.clock_);
+    lamps_ = std::move(other.lamps_);
+    seen_ = std::move(other.seen_);
+    camera_ = std::move(other.camera_);
+    return *this;
 }
 
 void SimRig::write_truth(const std::filesystem::path& folder) const {

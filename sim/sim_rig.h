@@ -24,6 +24,10 @@ public:
     /// The scene is rendered when the first lit frame is asked for.
     static SimRig make(const RigDescription& rig, const FaultPlan& faults = {});
 
+    SimRig(SimRig&&) noexcept = default;
+    SimRig& operator=(SimRig&& other) noexcept;
+    ~SimRig() = default;
+
     SimClock& clock() { return *clock_; }
     /// Where sim.lamps_seen names a file, the camera does not see these.
     SimLamps& lamps() { return *lamps_; }
