@@ -77,7 +77,8 @@ TEST(ExposureClock, FollowsANewRhythmThatStays) {
 }
 
 TEST(ExposureClock, AMeasuredTimingTakesTheDriversPlace) {
-    ExposureClock clock(camera(), MeasuredTiming{milliseconds(-20), milliseconds(3), Nanoseconds(0), microseconds(100)});
+    ExposureClock clock(camera(),
+                        MeasuredTiming{milliseconds(-20), milliseconds(3), Nanoseconds(0), microseconds(100)});
     for (std::uint64_t n = 0; n < 20; ++n) clock.follow(frame(n));
     EXPECT_EQ(clock.exposure_of(frame(5)).begin, begin_of(5) - milliseconds(20));
     EXPECT_EQ(clock.exposure_of(frame(5)).end, begin_of(5) + milliseconds(3));
