@@ -26,12 +26,13 @@ function(darkbox_module name)
   add_library(darkbox::${name} ALIAS darkbox_${name})
 endfunction()
 
-# darkbox_test(calibration_test SOURCES ... LINK ...): one test program; exit status 77 means every test skipped.
+# darkbox_test(calibration_test SOURCES ... LINK ... WRAP ...): one test program, run by another where one is named; exit
+# status 77 means every test skipped.
 function(darkbox_test name)
-  cmake_parse_arguments(T "" "" "SOURCES;LINK" ${ARGN})
+  cmake_parse_arguments(T "" "" "SOURCES;LINK;WRAP" ${ARGN})
   add_executable(${name} ${T_SOURCES})
   target_link_libraries(${name} PRIVATE darkbox_options darkbox_test_main ${T_LINK})
-  add_test(NAME ${name} COMMAND ${name})
+  add_test(NAME ${name} COMMAND ${T_WRAP} $<TARGET_FILE:${name}>)
   set_tests_properties(${name} PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600)
 endfunction()
 

@@ -24,16 +24,17 @@ double poisson(double mean, CounterRandom& random) {
 
 }  // namespace
 
-std::vector<std::uint16_t> expose(const Sensor& sensor, const RgbImage& radiance, const ExposureSetting& setting) {
+std::vector<std::uint16_t> expose(const Sensor& sensor, std::span<const float> radiance,
+                                  const ExposureSetting& setting) {
     const double electrons_per_radiance =
         sensor.full_well_e / sensor.full_scale_radiance * setting.exposure_s / sensor.reference_exposure_s;
     const double samples_per_electron = setting.gain * (sensor.full_scale() - sensor.black_level) / sensor.full_well_e;
     const CounterRandom frame_random = CounterRandom(sensor.seed).child(setting.frame);
-    std::vector<std::uint16_t> samples(radiance.samples.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, radiance.samples.size(), 4096), [&](const auto& range) {
+    std::vector<std::uint16_t> samples(radiance.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, radiance.size(), 4096), [&](const auto& range) {
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
             CounterRandom random = frame_random.child(i);
-            const double shot = poisson(radiance.samples[i] * electrons_per_radiance, random);
+            const double shot = poisson(radiance[i] * electrons_per_radiance, random);
             const double electrons =
                 std::min(shot, sensor.well_margin * sensor.full_well_e) + sensor.read_noise_e * random.normal();
             const double sample = std::round(sensor.black_level + samples_per_electron * electrons);

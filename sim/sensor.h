@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "sim/image.h"
@@ -27,9 +28,15 @@ struct ExposureSetting {
     std::uint64_t frame = 0;  ///< each frame has noise of its own
 };
 
-/// The samples of one picture, interleaved RGB: shot noise (Poisson) and read noise
+/// The samples of one picture, one for each of `radiance`: shot noise (Poisson) and read noise
 /// (normal) in electrons, saturation of the well, gain, black level, rounding, clipping. Model: EMVA 1288, section 2,
 /// without the dark current. Same seed, frame and radiance give the same samples.
-std::vector<std::uint16_t> expose(const Sensor& sensor, const RgbImage& radiance, const ExposureSetting& setting);
+std::vector<std::uint16_t> expose(const Sensor& sensor, std::span<const float> radiance,
+                                  const ExposureSetting& setting);
+/// Interleaved RGB.
+inline std::vector<std::uint16_t> expose(const Sensor& sensor, const RgbImage& radiance,
+                                         const ExposureSetting& setting) {
+    return expose(sensor, std::span(radiance.samples), setting);
+}
 
 }  // namespace darkbox::sim

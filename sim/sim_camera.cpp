@@ -34,16 +34,18 @@ void damage(std::vector<std::byte>& bytes) {
 
 }  // namespace
 
-SimCamera::SimCamera(const Scene& scene, const SimLamps& lamps, SimClock& clock, SimCameraOptions options)
+SimCamera::SimCamera(const Scene& scene, LampWitness& lamps, SimClock& clock, SimCameraOptions options)
     : scene_(scene),
       lamps_(lamps),
       clock_(clock),
       options_(std::move(options)),
       controls_(power_on_controls),
       controls_before_(power_on_controls),
-      waits_hung_(options_.faults.faults.size(), 0) {}
+      waits_hung_(options_.faults.faults.size(), 0) {
+    lamps_.set_strobe_source([this] { strobe_until_now(); });
+}
 
-SimCamera::~SimCamera() = default;
+SimCamera::~SimCamera() { lamps_.set_strobe_source({}); }
 
 CameraInfo SimCamera::configure(const CameraConfig& config) {
     if (state_ == State::streaming) throw std::logic_error("SimCamera::configure while streaming");
@@ -58,6 +60,7 @@ CameraInfo SimCamera::configure(const CameraConfig& config) {
     CameraInfo info;
     info.model = "darkbox simulated camera";
     info.id = "sim:" + scene_.name;
+    info.driver = "sim";
     info.width = scene_.view.width;
     info.height = scene_.view.height;
     info.format = format_of(options_.sensor);
@@ -67,6 +70,7 @@ CameraInfo SimCamera::configure(const CameraConfig& config) {
                                   controls_before_.exposure + options_.readout});
     info.queue_depth = options_.queue_depth;
     info.latency_frames = options_.latency_frames;
+    info.readout = Seconds(0);
     info.controls = controls_;
     period_ = to_nanoseconds(info.frame_period);
     return info;
@@ -76,7 +80,7 @@ void SimCamera::start() {
     if (state_ != State::ready) throw std::logic_error("SimCamera::start in a state other than ready");
     state_ = State::streaming;
     stream_start_ = clock_.now();
-    first_sequence_ = next_sequence_;
+    first_sequence_ = next_strobe_ = next_sequence_;
     queue_.clear();
     // Now, while nobody waits with a lamp lit: in real time the rendering takes longer than a lamp may be on.
     if (!scene_.lamps.empty()) picture_of(LampId{0});
@@ -99,7 +103,14 @@ SimCamera::Exposure SimCamera::exposure(std::uint64_t sequence) const {
     return e;
 }
 
+void SimCamera::strobe_until_now() {
+    if (state_ != State::streaming) return;
+    for (; exposure(next_strobe_).interval.end <= clock_.now(); ++next_strobe_)
+        lamps_.strobe(exposure(next_strobe_).interval.end);
+}
+
 void SimCamera::fill_queue() {
+    strobe_until_now();
     for (;; ++next_sequence_) {
         const Exposure e = exposure(next_sequence_);
         if (finished(e) > clock_.now()) return;

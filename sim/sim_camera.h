@@ -6,10 +6,10 @@
 
 #include "acquisition/camera/camera.h"
 #include "sim/faults.h"
+#include "sim/lamp_witness.h"
 #include "sim/renderer.h"
 #include "sim/sensor.h"
 #include "sim/sim_clock.h"
-#include "sim/sim_lamps.h"
 
 namespace darkbox::sim {
 
@@ -29,12 +29,13 @@ struct ExposureTruth {
     std::vector<LampShare> lamps;
 };
 
-/// A free-running camera with a global shutter that sees the scene in the light that the lamps really gave during each
-/// exposure. Timestamps are the start of the exposure; sequences go on counting over stop() and start().
-/// Refers to scene, lamps and clock. Configuring again is allowed while not streaming. Thread-compatible.
+/// A free-running camera with a global shutter and a strobe line to the lamps that sees the scene in the light that the
+/// lamps really gave during each exposure. Timestamps are the start of the exposure; sequences go on counting over
+/// stop() and start(). Refers to scene, lamps and clock. Configuring again is allowed while not streaming.
+/// Thread-compatible.
 class SimCamera final : public Camera {
 public:
-    SimCamera(const Scene& scene, const SimLamps& lamps, SimClock& clock, SimCameraOptions options);
+    SimCamera(const Scene& scene, LampWitness& lamps, SimClock& clock, SimCameraOptions options);
     ~SimCamera() override;
 
     CameraInfo configure(const CameraConfig& config) override;
@@ -57,6 +58,7 @@ private:
     Exposure exposure(std::uint64_t sequence) const;
     Exposure earlier(const Exposure& e, std::uint64_t frames) const;
     TimePoint finished(const Exposure& e) const { return e.interval.end + to_nanoseconds(options_.readout); }
+    void strobe_until_now();
     void fill_queue();
     void wait_for_frame(TimePoint deadline);
     bool hangs();
@@ -65,7 +67,7 @@ private:
     const RgbImage& picture_of(LampId lamp);
 
     const Scene& scene_;
-    const SimLamps& lamps_;
+    LampWitness& lamps_;
     SimClock& clock_;
     SimCameraOptions options_;
     State state_ = State::closed;
@@ -75,6 +77,7 @@ private:
     TimePoint stream_start_;
     std::uint64_t first_sequence_ = 0;  ///< of this stream
     std::uint64_t next_sequence_ = 0;   ///< to be exposed
+    std::uint64_t next_strobe_ = 0;     ///< the frame whose end of exposure is not told yet
     std::deque<Exposure> queue_;
     std::vector<std::uint64_t> waits_hung_;  ///< for each fault of the plan
     std::vector<RgbImage> pictures_;         ///< one for each lamp, made when the first is needed

@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
-#include <map>
 #include <utility>
 
 #include "acquisition/device/device_error.h"
@@ -24,20 +22,55 @@ SimLamps::SimLamps(std::size_t count, const SimClock& clock, FaultPlan faults)
 
 SimLamps::~SimLamps() = default;
 
-void SimLamps::light(LampId lamp, double level) {
+void SimLamps::check(LampId lamp, double level) const {
     if (lamp.value >= count_)
         throw DeviceError(fmt::format("lamp {} does not exist: the simulated rig has {}", lamp.value, count_),
                           "number lamps from 0 in the order of rig.toml");
     if (!(level > 0.0 && level <= 1.0))
         throw DeviceError(fmt::format("lamp {}: level {} is not in (0, 1]", lamp.value, level),
                           "use dark() to switch off");
-    command({{lamp, level}});
 }
 
-void SimLamps::dark() { command({}); }
+void SimLamps::catch_up() const {
+    if (catch_up_) catch_up_();
+}
 
-void SimLamps::command(std::vector<LampShare> commanded) {
-    history_.push_back({clock_.now(), really_burning(std::move(commanded), switches())});
+void SimLamps::light(LampId lamp, double level) {
+    check(lamp, level);
+    catch_up();
+    next_step_ = program_.size();
+    command(clock_.now(), {{lamp, level}});
+}
+
+void SimLamps::dark() {
+    catch_up();
+    next_step_ = program_.size();
+    command(clock_.now(), {});
+}
+
+void SimLamps::arm(const std::vector<StrobeStep>& program) {
+    for (const StrobeStep& step : program)
+        if (step.lamp) check(*step.lamp, step.level);
+    dark();
+    events_.clear();
+    program_ = program;
+    next_step_ = 0;
+}
+
+void SimLamps::strobe(TimePoint moment) {
+    if (next_step_ == program_.size()) return;
+    const StrobeStep& step = program_[next_step_];
+    command(moment, step.lamp ? std::vector<LampShare>{{*step.lamp, step.level}} : std::vector<LampShare>{});
+    events_.push_back({next_step_++, {moment, moment}});
+}
+
+std::vector<StrobeEvent> SimLamps::take_events() {
+    catch_up();
+    return std::exchange(events_, {});
+}
+
+void SimLamps::command(TimePoint when, std::vector<LampShare> commanded) {
+    history_.push_back({when, really_burning(std::move(commanded), switches())});
 }
 
 std::vector<LampShare> SimLamps::really_burning(std::vector<LampShare> burning, std::uint64_t call) const {
@@ -56,17 +89,7 @@ std::vector<LampShare> SimLamps::really_burning(std::vector<LampShare> burning, 
 }
 
 std::vector<LampShare> SimLamps::burning_during(const Interval& interval) const {
-    std::map<LampId, double> seconds;
-    for (std::size_t i = 0; i < history_.size(); ++i) {
-        const TimePoint end = i + 1 < history_.size() ? history_[i + 1].when : interval.end;
-        const Nanoseconds overlap = std::min(end, interval.end) - std::max(history_[i].when, interval.begin);
-        if (overlap <= Nanoseconds(0)) continue;
-        for (const LampShare& b : history_[i].burning) seconds[b.lamp] += b.share * to_seconds(overlap);
-    }
-    std::vector<LampShare> shares;
-    const double whole = to_seconds(interval.end - interval.begin);
-    for (const auto& [lamp, lit] : seconds) shares.push_back({lamp, lit / whole});
-    return shares;
+    return sim::burning_during(history_, interval);
 }
 
 }  // namespace darkbox::sim

@@ -1,22 +1,20 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "rig/lamps/lamp_array.h"
+#include "rig/lamps/strobed_lamps.h"
 #include "sim/faults.h"
+#include "sim/lamp_witness.h"
 #include "sim/sim_clock.h"
 
 namespace darkbox::sim {
 
-/// A lamp and how much light it gave: 1 = full level during a whole exposure.
-struct LampShare {
-    LampId lamp;
-    double share = 0.0;
-};
-
-/// Lamps that switch at once and remember when. Refers to the clock. Thread-compatible.
-class SimLamps final : public LampArray {
+/// Lamps that switch at once and remember when, by command or by the simulated camera's strobe. Refers to the clock.
+/// Thread-compatible.
+class SimLamps final : public LampArray, public LampWitness, public StrobedLamps {
 public:
     SimLamps(std::size_t count, const SimClock& clock, FaultPlan faults = {});
     ~SimLamps() override;
@@ -25,27 +23,33 @@ public:
     void light(LampId lamp, double level) override;
     void dark() override;
     LampHealth health() override { return {}; }
+    StrobedLamps* strobed() override { return this; }
+    void arm(const std::vector<StrobeStep>& program) override;
+    std::vector<StrobeEvent> take_events() override;
 
-    /// The lamps that really burned during the interval, by id; those that did not are left out.
-    std::vector<LampShare> burning_during(const Interval& interval) const;
+    void strobe(TimePoint moment) override;
+    void set_strobe_source(std::function<void()> catch_up) override { catch_up_ = std::move(catch_up); }
+
+    std::vector<LampShare> burning_during(const Interval& interval) const override;
     /// How often light() and dark() were called.
     std::uint64_t switches() const { return history_.size() - 1; }
     /// Whether nothing was commanded to burn last, and nothing is stuck.
     bool all_dark() const { return history_.back().burning.empty(); }
 
 private:
-    struct Switch {
-        TimePoint when;
-        std::vector<LampShare> burning;
-    };
-
-    void command(std::vector<LampShare> commanded);
+    void check(LampId lamp, double level) const;
+    void catch_up() const;
+    void command(TimePoint when, std::vector<LampShare> commanded);
     std::vector<LampShare> really_burning(std::vector<LampShare> commanded, std::uint64_t call) const;
 
     std::size_t count_;
     const SimClock& clock_;
     FaultPlan faults_;
-    std::vector<Switch> history_;
+    std::vector<LampSwitch> history_;
+    std::function<void()> catch_up_;
+    std::vector<StrobeStep> program_;
+    std::size_t next_step_ = 0;  ///< of the program; its size: none is left
+    std::vector<StrobeEvent> events_;
 };
 
 }  // namespace darkbox::sim

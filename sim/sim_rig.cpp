@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "acquisition/frame/error.h"
 #include "sim/scenes.h"
 #include "sim/truth.h"
@@ -23,6 +25,8 @@ void validate(const SimDescription& sim) {
     require(sim.queue_depth >= 1, "queue_depth", sim.queue_depth, "1 or more");
 }
 
+}  // namespace
+
 Sensor sensor_of(const SimDescription& sim) {
     Sensor sensor;
     sensor.bit_depth = sim.bit_depth;
@@ -32,8 +36,6 @@ Sensor sensor_of(const SimDescription& sim) {
     sensor.seed = sim.seed;
     return sensor;
 }
-
-}  // namespace
 
 SimRig SimRig::make(const RigDescription& rig, const FaultPlan& faults) {
     validate(rig.sim);
@@ -48,8 +50,20 @@ SimRig SimRig::make(const RigDescription& rig, const FaultPlan& faults) {
     options.latency_frames = rig.sim.latency_frames;
     options.queue_depth = rig.sim.queue_depth;
     options.faults = faults;
-    result.camera_ = std::make_unique<SimCamera>(*result.scene_, *result.lamps_, *result.clock_, options);
+    if (!rig.sim.lamps_seen.empty()) result.seen_ = std::make_unique<SeenLamps>(rig);
+    LampWitness& witness = result.seen_ ? static_cast<LampWitness&>(*result.seen_) : *result.lamps_;
+    result.camera_ = std::make_unique<SimCamera>(*result.scene_, witness, *result.clock_, options);
     return result;
+}
+
+SimRig& SimRig::operator=(SimRig&& other) noexcept {
+    camera_.reset();  // first: it holds on to the lamps it strobes, and to all else
+    scene_ = std::move(other.scene_);
+    clock_ = std::move(other.clock_);
+    lamps_ = std::move(other.lamps_);
+    seen_ = std::move(other.seen_);
+    camera_ = std::move(other.camera_);
+    return *this;
 }
 
 void SimRig::write_truth(const std::filesystem::path& folder) const {

@@ -6,11 +6,15 @@
 #include "rig/description/rig_description.h"
 #include "sim/faults.h"
 #include "sim/scene.h"
+#include "sim/seen_lamps.h"
 #include "sim/sim_camera.h"
 #include "sim/sim_clock.h"
 #include "sim/sim_lamps.h"
 
 namespace darkbox::sim {
+
+/// The sensor of a description.
+Sensor sensor_of(const SimDescription& sim);
 
 /// The whole simulated rig: what a command or the daemon uses in place of devices. Move-only; the parts refer to each
 /// other and stay where they are. Thread-compatible; the clock is thread-safe.
@@ -20,7 +24,12 @@ public:
     /// The scene is rendered when the first lit frame is asked for.
     static SimRig make(const RigDescription& rig, const FaultPlan& faults = {});
 
+    SimRig(SimRig&&) noexcept = default;
+    SimRig& operator=(SimRig&& other) noexcept;
+    ~SimRig() = default;
+
     SimClock& clock() { return *clock_; }
+    /// Where sim.lamps_seen names a file, the camera does not see these.
     SimLamps& lamps() { return *lamps_; }
     SimCamera& camera() { return *camera_; }
     const Scene& scene() const { return *scene_; }
@@ -34,6 +43,7 @@ private:
     std::unique_ptr<const Scene> scene_;
     std::unique_ptr<SimClock> clock_;
     std::unique_ptr<SimLamps> lamps_;
+    std::unique_ptr<SeenLamps> seen_;  ///< what the camera sees instead
     std::unique_ptr<SimCamera> camera_;
 };
 

@@ -10,9 +10,10 @@
 #include <fstream>
 #include <initializer_list>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core.hpp>
 
 #include "acquisition/device/device_error.h"
+#include "processing/formats/png.h"
 #include "sim/renderer.h"
 
 namespace darkbox::sim {
@@ -50,13 +51,13 @@ void write_mask(const SceneTruth& truth, const fs::path& file) {
     cv::Mat1b mask(truth.normals.height, truth.normals.width);
     std::transform(truth.mask.begin(), truth.mask.end(), mask.begin(),
                    [](char inside) { return static_cast<unsigned char>(inside != 0 ? 255 : 0); });
-    if (!cv::imwrite(file.string(), mask)) throw_unwritable(file, "the picture library refused");
+    write_png(file, mask);
 }
 
 void write_materials(const SceneTruth& truth, const fs::path& file) {
     cv::Mat1w materials(truth.normals.height, truth.normals.width);
     std::copy(truth.materials.begin(), truth.materials.end(), materials.begin());
-    if (!cv::imwrite(file.string(), materials)) throw_unwritable(file, "the picture library refused");
+    write_png(file, materials);
 }
 
 void write_text(const std::string& text, const fs::path& file) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,8 +17,9 @@ struct CameraConfig {
 /// What is really in effect after configure().
 struct CameraInfo {
     std::string model;
-    std::string id;  ///< stable over replugging
-    int width = 0;   ///< pixels
+    std::string id;      ///< stable over replugging
+    std::string driver;  ///< of the kernel; "sim"
+    int width = 0;       ///< pixels
     int height = 0;
     PixelFormat format = PixelFormat::grey16;
     int bit_depth = 16;
@@ -25,6 +27,9 @@ struct CameraInfo {
     Seconds frame_period{1.0 / 30};
     int queue_depth = 1;     ///< buffers that may hold stale frames
     int latency_frames = 0;  ///< exposures that pass before new controls take effect
+    /// Rolling shutter: from the first row's end of exposure to the last row's; 0: all rows at once; none: not known,
+    /// and frames' exposures are taken as long as they may be.
+    std::optional<Seconds> readout;
     FrameControls controls;
     std::vector<std::string> notes;  ///< what a session should keep of it besides, in words
 };

@@ -107,6 +107,7 @@ CameraInfo V4l2Camera::describe(const v4l2_capability& capability, const Setup& 
     CameraInfo info;
     info.model = text(capability.card);
     info.id = options_.device;
+    info.driver = text(capability.driver);
     info.width = width;
     info.height = height;
     info.format = format.format;

@@ -19,6 +19,8 @@ constexpr std::array<std::pair<IntensityOrigin, const char*>, 5> names{{{Intensi
                                                                         {IntensityOrigin::estimated, "estimated"}}};
 constexpr double least_cosine = 0.1;         // a light that grazes the card says little of its intensity
 constexpr double most_clipped_share = 0.01;  // of the card's pixels
+constexpr double least_brightness = 0.1;     // of the picture's brightest parts: a card is no darker
+constexpr double brightest_share = 0.01;     // of the picture's pixels
 constexpr double noticeable_spread = 1.5;
 
 const char* remedy = "move the card, name another area, or leave that frame out";
@@ -57,6 +59,16 @@ double expected(const Light& light, const GreyCard& card, const cv::Mat1b& pixel
     return sum / cv::countNonZero(pixels);
 }
 
+/// Channel mean that only the brightest hundredth of the picture exceeds.
+double brightest_of(const cv::Mat3f& frame) {
+    std::vector<float> means;
+    means.reserve(frame.total());
+    for (const cv::Vec3f& rgb : frame) means.push_back((rgb[0] + rgb[1] + rgb[2]) / 3);
+    const auto rank = static_cast<std::ptrdiff_t>((1 - brightest_share) * static_cast<double>(means.size() - 1));
+    std::nth_element(means.begin(), means.begin() + rank, means.end());
+    return static_cast<double>(means[static_cast<std::size_t>(rank)]);
+}
+
 Eigen::Vector3d intensity_of(const cv::Mat3f& frame, const cv::Mat1b& clipped, const Light& light, const GreyCard& card,
                              const cv::Mat1b& pixels) {
     const double geometry = expected(light, card, pixels);
@@ -67,7 +79,8 @@ Eigen::Vector3d intensity_of(const cv::Mat3f& frame, const cv::Mat1b& clipped, c
         throw InputError(fmt::format("the grey card is clipped in {}", light.file), "expose it less");
     const cv::Scalar mean = cv::mean(frame, pixels);
     const Eigen::Vector3d intensity = Eigen::Vector3d(mean[0], mean[1], mean[2]) / geometry;
-    if (!(intensity.allFinite() && intensity.minCoeff() > 0))
+    if (!(intensity.allFinite() && intensity.minCoeff() > 0) ||
+        (mean[0] + mean[1] + mean[2]) / 3 < least_brightness * geometry * brightest_of(frame))
         throw InputError(fmt::format("the grey card is dark in {}", light.file), remedy);
     return intensity;
 }

@@ -15,6 +15,7 @@ constexpr double poor_condition = 20;
 constexpr double same_direction_deg = 1.0;
 constexpr double rough_contour_px = 0.7;
 constexpr double thin_support = 0.3;
+constexpr std::size_t most_named = 5;  // groups of lights, files of a group
 
 void warn_of_geometry(const Calibration& calibration, std::vector<std::string>& warnings) {
     if (direction_matrix(calibration.lights).rows() >= 3 && calibration.condition_number > poor_condition)
@@ -44,8 +45,17 @@ std::vector<std::size_t> groups_of(const Lights& lights) {
     return group;
 }
 
+/// All but the last of these files, the first few by name.
+std::string named(const std::vector<std::string>& files) {
+    const std::size_t others = files.size() - 1, shown = std::min(others, most_named);
+    const auto first = files.begin(), end = first + static_cast<std::ptrdiff_t>(shown);
+    const std::string names = fmt::format("{}", fmt::join(first, end, ", "));
+    return shown == others ? names : fmt::format("{}, {} more", names, others - shown);
+}
+
 void warn_of_duplicates(const Lights& lights, std::vector<std::string>& warnings) {
     const std::vector<std::size_t> group = groups_of(lights);
+    std::size_t groups = 0, in_groups = 0;
     for (std::size_t first = 0; first < lights.size(); ++first) {
         std::vector<std::string> files;
         double widest = 0;
@@ -56,12 +66,17 @@ void warn_of_duplicates(const Lights& lights, std::vector<std::string>& warnings
                 if (group[j] == first) widest = std::max(widest, angle_deg(lights[i].direction, lights[j].direction));
         }
         if (files.size() < 2) continue;
-        const std::string last = files.back();
-        files.pop_back();
+        ++groups;
+        in_groups += files.size();
+        if (groups > most_named) continue;
         warnings.push_back(
             fmt::format("{} and {} were lit from the same direction within {:.2f} degrees: is one lamp named {}?",
-                        fmt::join(files, ", "), last, widest, files.size() == 1 ? "twice" : "several times"));
+                        named(files), files.back(), widest, files.size() == 2 ? "twice" : "several times"));
     }
+    if (groups > most_named)
+        warnings.push_back(
+            fmt::format("in all {} lights in {} groups share their direction with others within {:.0f} degree",
+                        in_groups, groups, same_direction_deg));
 }
 
 void warn_of_outline(const Calibration& calibration, std::vector<std::string>& warnings) {

@@ -1,6 +1,7 @@
 #include <csetjmp>
 #include <cstdio>
 #include <string>
+#include <vector>
 
 #include "processing/formats/picture_header.h"
 #include "processing/formats/row_decoders.h"
@@ -40,6 +41,8 @@ struct JpegDecoder {
             leave(common);
     }
 
+    bool is_cmyk() const { return decompress.jpeg_color_space == JCS_CMYK || decompress.jpeg_color_space == JCS_YCCK; }
+
     jpeg_decompress_struct decompress{};
     jpeg_error_mgr errors{};
     std::jmp_buf way_out{};
@@ -51,7 +54,7 @@ bool start(JpegDecoder& decoder, std::FILE* file) {
     ::jpeg_create_decompress(&decoder.decompress);
     ::jpeg_stdio_src(&decoder.decompress, file);
     ::jpeg_read_header(&decoder.decompress, TRUE);
-    decoder.decompress.out_color_space = JCS_RGB;
+    decoder.decompress.out_color_space = decoder.is_cmyk() ? JCS_CMYK : JCS_RGB;
     return true;
 }
 
@@ -63,6 +66,13 @@ bool start_decoding(JpegDecoder& decoder) {
 bool read_row(JpegDecoder& decoder, JSAMPROW row) {
     if (setjmp(decoder.way_out) != 0) return false;
     return ::jpeg_read_scanlines(&decoder.decompress, &row, 1) == 1;
+}
+
+/// What is printed reflects what its ink and its black let through. Adobe's files hold that, others the ink itself.
+void rgb_from_cmyk(const std::vector<uchar>& cmyk, bool inverted, uchar* rgb) {
+    const auto through = [&](std::size_t i) { return inverted ? cmyk[i] : 255 - cmyk[i]; };
+    for (std::size_t i = 0; i < cmyk.size(); i += 4)
+        for (std::size_t c = 0; c < 3; ++c) *rgb++ = static_cast<uchar>((through(i + c) * through(i + 3) + 127) / 255);
 }
 
 class JpegRows : public PictureRows {
@@ -78,14 +88,23 @@ public:
     void read(cv::Mat& rows) override {
         if (!started_) started_ = start_decoding(*decoder_);
         bool good = started_;
-        for (int y = 0; good && y < rows.rows; ++y) good = read_row(*decoder_, rows.ptr(y));
+        for (int y = 0; good && y < rows.rows; ++y)
+            good = decoder_->is_cmyk() ? read_cmyk(rows.ptr(y)) : read_row(*decoder_, rows.ptr(y));
         if (!good) throw bad_picture(file_, std::string("is damaged or cut short: ") + decoder_->error);
     }
 
 private:
+    bool read_cmyk(uchar* rgb) {
+        cmyk_.resize(4 * static_cast<std::size_t>(size().width));
+        if (!read_row(*decoder_, cmyk_.data())) return false;
+        rgb_from_cmyk(cmyk_, decoder_->decompress.saw_Adobe_marker != 0, rgb);
+        return true;
+    }
+
     std::string file_;
     FileHandle handle_;
     std::unique_ptr<JpegDecoder> decoder_;
+    std::vector<uchar> cmyk_;
     bool started_ = false;
 };
 
@@ -98,8 +117,6 @@ std::unique_ptr<PictureRows> open_jpeg_rows(const fs::path& path) {
     if (!start(*decoder, handle.get()))
         throw bad_picture(file, std::string("is damaged or cut short: ") + decoder->error);
     require_sane_size(decoder->decompress.image_width, decoder->decompress.image_height, file);
-    if (decoder->decompress.jpeg_color_space == JCS_CMYK || decoder->decompress.jpeg_color_space == JCS_YCCK)
-        return open_whole_picture(path);
     return std::make_unique<JpegRows>(file, std::move(handle), std::move(decoder));
 }
 

@@ -22,6 +22,8 @@ struct Failure {
 
 [[noreturn]] void leave(j_common_ptr codec) { std::longjmp(reinterpret_cast<Failure*>(codec->err)->way_out, 1); }
 
+enum class Chroma { full, halved };
+
 struct Buffer {
     unsigned char* bytes = nullptr;
     unsigned long size = 0;
@@ -29,7 +31,7 @@ struct Buffer {
 };
 
 /// Holds nothing with a destructor, since longjmp would pass it by. False when libjpeg gave up.
-bool compress(const cv::Mat3b& image, int quality, Buffer& buffer) {
+bool compress(const cv::Mat3b& image, int quality, Chroma chroma, Buffer& buffer) {
     jpeg_compress_struct codec;
     Failure failure;
     codec.err = jpeg_std_error(&failure.manager);
@@ -46,7 +48,9 @@ bool compress(const cv::Mat3b& image, int quality, Buffer& buffer) {
     codec.in_color_space = JCS_RGB;
     jpeg_set_defaults(&codec);
     jpeg_set_quality(&codec, quality, TRUE);
-    for (int c = 0; c < 3; ++c) codec.comp_info[c].h_samp_factor = codec.comp_info[c].v_samp_factor = 1;
+    const int across = chroma == Chroma::halved ? 2 : 1;
+    codec.comp_info[0].h_samp_factor = codec.comp_info[0].v_samp_factor = across;
+    for (int c = 1; c < 3; ++c) codec.comp_info[c].h_samp_factor = codec.comp_info[c].v_samp_factor = 1;
     jpeg_start_compress(&codec, TRUE);
     for (int y = 0; y < image.rows; ++y) {
         JSAMPROW row = const_cast<JSAMPROW>(image.ptr<uchar>(y));  // libjpeg only reads it
@@ -57,15 +61,23 @@ bool compress(const cv::Mat3b& image, int quality, Buffer& buffer) {
     return true;
 }
 
-}  // namespace
-
-std::vector<std::byte> encode_data_jpeg(const cv::Mat3b& image, int quality) {
+std::vector<std::byte> encoded(const cv::Mat3b& image, int quality, Chroma chroma) {
     Buffer buffer;
-    if (image.empty() || !compress(image, quality, buffer))
+    if (image.empty() || !compress(image, quality, chroma, buffer))
         throw InputError(fmt::format("a picture of {}x{} pixels cannot be a JPEG", image.cols, image.rows),
                          "crop the photographs to at most 65500 pixels a side");
     const auto* bytes = reinterpret_cast<const std::byte*>(buffer.bytes);
     return {bytes, bytes + buffer.size};
+}
+
+}  // namespace
+
+std::vector<std::byte> encode_jpeg(const cv::Mat3b& image, int quality) {
+    return encoded(image, quality, Chroma::halved);
+}
+
+std::vector<std::byte> encode_data_jpeg(const cv::Mat3b& image, int quality) {
+    return encoded(image, quality, Chroma::full);
 }
 
 }  // namespace darkbox

@@ -6,8 +6,11 @@
 
 namespace darkbox {
 
-/// JPEG bytes of R, G, B with full-resolution chroma, for pictures whose channels are data and not colours. OpenCV's
-/// writer halves the chroma. Throws InputError beyond 65500 pixels a side.
+// JPEG bytes of R, G, B. Quality 1...100. Each throws InputError for an empty picture and beyond 65500 pixels a side.
+
+/// For looking at: chroma at half the resolution.
+std::vector<std::byte> encode_jpeg(const cv::Mat3b& image, int quality);
+/// For pictures whose channels are data and not colours: full-resolution chroma.
 std::vector<std::byte> encode_data_jpeg(const cv::Mat3b& image, int quality);
 
 }  // namespace darkbox

@@ -6,12 +6,12 @@
 #include <array>
 #include <cctype>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
+#include <vector>
 
 #include "processing/formats/atomic_file.h"
 #include "processing/formats/exr_codec.h"
 #include "processing/formats/picture_header.h"
+#include "processing/formats/picture_rows.h"
 #include "processing/maps/maps.h"
 
 namespace darkbox {
@@ -47,25 +47,7 @@ PictureHeader inspect(Bytes bytes, PictureFormat format, const std::string& file
     }
 }
 
-cv::Mat decode_with_opencv(Bytes bytes, const std::string& file) {
-    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8U, const_cast<std::byte*>(bytes.data()));
-    cv::Mat decoded;
-    try {
-        decoded = cv::imdecode(buffer, cv::IMREAD_COLOR | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
-    } catch (const cv::Exception&) {
-        decoded.release();  // one error for both ways in which it fails
-    }
-    if (decoded.empty() || decoded.channels() != 3) throw bad_picture(file, "is damaged: it cannot be decoded");
-    return decoded;
-}
-
-double full_scale(int depth, const std::string& file) {
-    if (depth == CV_8U) return 255.0;
-    if (depth == CV_16U) return 65535.0;
-    if (depth == CV_32F) return 1.0;
-    throw InputError(fmt::format("{} has a kind of samples that darkbox does not read", file),
-                     "save it with 8 or 16 bits, or as 32-bit float");
-}
+double full_scale(int depth) { return depth == CV_8U ? 255.0 : depth == CV_16U ? 65535.0 : 1.0; }
 
 Picture decode_exr_picture(Bytes bytes, const std::string& file) {
     Picture picture;
@@ -76,16 +58,21 @@ Picture decode_exr_picture(Bytes bytes, const std::string& file) {
     return picture;
 }
 
-Picture decode_integer_picture(Bytes bytes, PictureFormat format, const std::string& file) {
+/// The container is walked as a whole before, since decoders do not tell all of its damage.
+std::optional<EmbeddedCurve> inspected_curve(Bytes bytes, PictureFormat format, const std::string& file) {
     const PictureHeader header = inspect(bytes, format, file);
     require_sane_size(header.width, header.height, file);
-    const cv::Mat bgr = decode_with_opencv(bytes, file);
+    return header.embedded;
+}
+
+Picture read_by_rows(const fs::path& path) {
+    const std::unique_ptr<PictureRows> rows = open_picture_rows(path);
+    cv::Mat samples(rows->size(), rows->type());
+    rows->read(samples);
     Picture picture;
-    bgr.convertTo(picture.samples, CV_32F, 1.0 / full_scale(bgr.depth(), file));
-    cv::cvtColor(picture.samples, picture.samples, cv::COLOR_BGR2RGB);
-    picture.is_float = bgr.depth() == CV_32F;
-    picture.bit_depth = picture.is_float ? 32 : bgr.depth() == CV_16U ? 16 : 8;
-    picture.embedded = header.embedded;
+    samples.convertTo(picture.samples, CV_32F, 1.0 / full_scale(samples.depth()));
+    picture.is_float = samples.depth() == CV_32F;
+    picture.bit_depth = picture.is_float ? 32 : samples.depth() == CV_16U ? 16 : 8;
     return picture;
 }
 
@@ -142,21 +129,31 @@ cv::Mat1b clipped_samples(const Picture& picture) {
     return clipped;
 }
 
-Picture decode_picture(Bytes bytes, const std::string& file) {
+Picture read_picture(const fs::path& path) {
+    const std::string file = path.string();
+    std::vector<std::byte> bytes = read_file(path);
     const PictureFormat format = require_picture_format(bytes, file);
-    Picture picture =
-        format == PictureFormat::exr ? decode_exr_picture(bytes, file) : decode_integer_picture(bytes, format, file);
+    Picture picture;
+    if (format == PictureFormat::exr) {
+        picture = decode_exr_picture(bytes, file);
+        require_finite(picture.samples, 0, file);
+    } else {
+        const std::optional<EmbeddedCurve> embedded = inspected_curve(bytes, format, file);
+        bytes = {};
+        picture = read_by_rows(path);
+        picture.embedded = embedded;
+    }
     picture.format = format;
-    if (picture.is_float) require_finite(picture.samples, 0, file);
     return picture;
 }
-
-Picture read_picture(const fs::path& path) { return decode_picture(read_file(path), path.string()); }
 
 cv::Mat1b read_mask(const fs::path& path) {
     const cv::Mat1f grey = mean_channel(read_picture(path).samples);
     cv::Mat1b mask;
     cv::compare(grey, 0.5, mask, cv::CMP_GE);
+    if (cv::countNonZero(mask) == 0)
+        throw InputError(fmt::format("the mask {} is black everywhere", path.string()),
+                         "a mask is white where the object is");
     return mask;
 }
 

@@ -42,10 +42,8 @@ cv::Mat1b clipped_samples(const Picture& picture);
 /// samples that are not finite.
 Picture read_picture(const std::filesystem::path& path);
 
-/// The same from bytes in memory; `file` is only named in errors.
-Picture decode_picture(std::span<const std::byte> bytes, const std::string& file);
-
-/// 255 where the picture's channel mean is at least half of full scale; anti-aliased edges are cut there.
+/// 255 where the picture's channel mean is at least half of full scale; anti-aliased edges are cut there. Throws
+/// InputError for a picture that is black everywhere.
 cv::Mat1b read_mask(const std::filesystem::path& path);
 
 }  // namespace darkbox

@@ -17,17 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A picture's samples in the narrowest type that holds them again.
-cv::Mat narrowed(const Picture& picture) {
-    if (picture.is_float) return picture.samples;
-    cv::Mat samples;
-    if (picture.bit_depth == 8)
-        picture.samples.convertTo(samples, CV_8U, 255.0);
-    else
-        picture.samples.convertTo(samples, CV_16U, 65535.0);
-    return samples;
-}
-
 class WholePicture : public PictureRows {
 public:
     explicit WholePicture(cv::Mat samples)
@@ -59,9 +48,7 @@ FileHandle open_for_reading(const fs::path& path) {
     return file;
 }
 
-std::unique_ptr<PictureRows> open_whole_picture(const fs::path& path) {
-    return std::make_unique<WholePicture>(narrowed(read_picture(path)));
-}
+std::unique_ptr<PictureRows> rows_of(cv::Mat samples) { return std::make_unique<WholePicture>(std::move(samples)); }
 
 std::unique_ptr<PictureRows> open_picture_rows(const fs::path& path) {
     std::array<std::byte, 8> start{};

@@ -10,8 +10,6 @@ namespace darkbox {
 
 /// PNG bytes of a 1- or 3-channel picture of 8 or 16 bits; three channels are R, G, B.
 std::vector<std::byte> encode_png(const cv::Mat& image);
-/// JPEG bytes, for pictures inside a report. Quality 1...100.
-std::vector<std::byte> encode_jpeg(const cv::Mat3b& image, int quality);
 
 void write_png(const std::filesystem::path& path, const cv::Mat& image);
 

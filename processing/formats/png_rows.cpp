@@ -39,6 +39,7 @@ void ask_for_rgb(png_structp png, png_infop info) {
     ::png_set_strip_alpha(png);
     ::png_set_gray_to_rgb(png);
     if (::png_get_bit_depth(png, info) == 16) ::png_set_swap(png);
+    ::png_set_interlace_handling(png);
     ::png_read_update_info(png, info);
 }
 
@@ -63,6 +64,13 @@ bool read_rows(PngDecoder& decoder, png_bytepp rows, png_uint_32 count) {
     return true;
 }
 
+/// Interlaced: rows are complete only when all are.
+bool read_image(PngDecoder& decoder, png_bytepp rows) {
+    if (setjmp(png_jmpbuf(decoder.png)) != 0) return false;
+    ::png_read_image(decoder.png, rows);
+    return true;
+}
+
 /// The checksums after the last row.
 bool read_end(PngDecoder& decoder) {
     if (setjmp(png_jmpbuf(decoder.png)) != 0) return false;
@@ -70,19 +78,31 @@ bool read_end(PngDecoder& decoder) {
     return true;
 }
 
+std::vector<png_bytep> row_pointers(cv::Mat& rows) {
+    std::vector<png_bytep> pointers(static_cast<std::size_t>(rows.rows));
+    for (int y = 0; y < rows.rows; ++y) pointers[static_cast<std::size_t>(y)] = rows.ptr(y);
+    return pointers;
+}
+
+cv::Size size_of(const PngDecoder& decoder) {
+    return {static_cast<int>(::png_get_image_width(decoder.png, decoder.info)),
+            static_cast<int>(::png_get_image_height(decoder.png, decoder.info))};
+}
+
+int type_of(const PngDecoder& decoder) {
+    return ::png_get_bit_depth(decoder.png, decoder.info) == 16 ? CV_16UC3 : CV_8UC3;
+}
+
 class PngRows : public PictureRows {
 public:
     PngRows(const std::string& file, FileHandle handle, std::unique_ptr<PngDecoder> decoder)
-        : PictureRows({static_cast<int>(::png_get_image_width(decoder->png, decoder->info)),
-                       static_cast<int>(::png_get_image_height(decoder->png, decoder->info))},
-                      ::png_get_bit_depth(decoder->png, decoder->info) == 16 ? CV_16UC3 : CV_8UC3),
+        : PictureRows(size_of(*decoder), type_of(*decoder)),
           file_(file),
           handle_(std::move(handle)),
           decoder_(std::move(decoder)) {}
 
     void read(cv::Mat& rows) override {
-        std::vector<png_bytep> pointers(static_cast<std::size_t>(rows.rows));
-        for (int y = 0; y < rows.rows; ++y) pointers[static_cast<std::size_t>(y)] = rows.ptr(y);
+        std::vector<png_bytep> pointers = row_pointers(rows);
         next_ += rows.rows;
         const bool good = read_rows(*decoder_, pointers.data(), static_cast<png_uint_32>(rows.rows)) &&
                           (next_ < size().height || read_end(*decoder_));
@@ -105,8 +125,13 @@ std::unique_ptr<PictureRows> open_png_rows(const fs::path& path) {
     if (!read_header(*decoder, handle.get())) throw bad_picture(file, "is damaged or cut short: " + decoder->error);
     require_sane_size(::png_get_image_width(decoder->png, decoder->info),
                       ::png_get_image_height(decoder->png, decoder->info), file);
-    if (::png_get_interlace_type(decoder->png, decoder->info) != PNG_INTERLACE_NONE) return open_whole_picture(path);
     if (!set_transforms(*decoder)) throw bad_picture(file, "is damaged: " + decoder->error);
+    if (::png_get_interlace_type(decoder->png, decoder->info) != PNG_INTERLACE_NONE) {
+        cv::Mat whole(size_of(*decoder), type_of(*decoder));
+        if (!read_image(*decoder, row_pointers(whole).data()) || !read_end(*decoder))
+            throw bad_picture(file, "is damaged or cut short: " + decoder->error);
+        return rows_of(whole);
+    }
     return std::make_unique<PngRows>(file, std::move(handle), std::move(decoder));
 }
 

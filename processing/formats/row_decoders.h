@@ -22,7 +22,7 @@ std::unique_ptr<PictureRows> open_png_rows(const std::filesystem::path& path);
 std::unique_ptr<PictureRows> open_jpeg_rows(const std::filesystem::path& path);
 std::unique_ptr<PictureRows> open_tiff_rows(const std::filesystem::path& path);
 std::unique_ptr<PictureRows> open_exr_rows(const std::filesystem::path& path);
-/// Decodes all of it at the first read: for what cannot be decoded row by row.
-std::unique_ptr<PictureRows> open_whole_picture(const std::filesystem::path& path);
+/// Of samples that are decoded already: for what cannot be decoded row by row.
+std::unique_ptr<PictureRows> rows_of(cv::Mat samples);
 
 }  // namespace darkbox

@@ -51,15 +51,16 @@ std::uint32_t number_tag(TIFF* tiff, ttag_t tag) {
 /// How samples lie in a decoded row.
 struct Samples {
     int depth = CV_8U;
-    int channels = 3;
+    int channels = 3;  ///< grey or R, G, B first, then what is left out, such as alpha
+    bool grey() const { return channels < 3; }
 };
 
-/// No value for what is better decoded whole.
+/// No value for palettes, separate planes, inverted grey and odd bit depths.
 std::optional<Samples> plain_samples(TIFF* tiff) {
     const int bits = short_tag(tiff, TIFFTAG_BITSPERSAMPLE), channels = short_tag(tiff, TIFFTAG_SAMPLESPERPIXEL);
     const int photometric = short_tag(tiff, TIFFTAG_PHOTOMETRIC), format = short_tag(tiff, TIFFTAG_SAMPLEFORMAT);
-    const bool colours =
-        (photometric == PHOTOMETRIC_RGB && channels == 3) || (photometric == PHOTOMETRIC_MINISBLACK && channels == 1);
+    const bool colours = (photometric == PHOTOMETRIC_RGB && channels >= 3) ||
+                         (photometric == PHOTOMETRIC_MINISBLACK && (channels == 1 || channels == 2));
     if (!colours || short_tag(tiff, TIFFTAG_PLANARCONFIG) != PLANARCONFIG_CONTIG) return std::nullopt;
     const bool whole = format == SAMPLEFORMAT_UINT;
     if (whole && bits == 8) return Samples{CV_8U, channels};
@@ -88,10 +89,11 @@ public:
     }
 
     void read(cv::Mat& rows) override {
-        if (samples_.channels == 1) grey_.resize(row_bytes_);
+        const bool as_stored = samples_.channels == 3;
+        if (!as_stored) stored_.resize(row_bytes_);
         for (int y = 0; y < rows.rows; ++y, ++next_) {
-            read_row(samples_.channels == 1 ? grey_.data() : rows.ptr(y));
-            if (samples_.channels == 1) replicate(rows, y);
+            read_row(as_stored ? rows.ptr(y) : stored_.data());
+            if (!as_stored) pick_colours(rows, y);
         }
         if (samples_.depth == CV_32F) require_finite(rows, next_ - rows.rows, file_);
     }
@@ -129,10 +131,12 @@ private:
         }
     }
 
-    void replicate(cv::Mat& rows, int y) {
-        const cv::Mat grey(1, rows.cols, CV_MAKETYPE(samples_.depth, 1), grey_.data());
+    void pick_colours(cv::Mat& rows, int y) {
+        const cv::Mat stored(1, rows.cols, CV_MAKETYPE(samples_.depth, samples_.channels), stored_.data());
         cv::Mat row = rows.row(y);
-        cv::merge(std::array<cv::Mat, 3>{grey, grey, grey}.data(), 3, row);
+        const std::array<int, 6> from_to =
+            samples_.grey() ? std::array{0, 0, 0, 1, 0, 2} : std::array{0, 0, 1, 1, 2, 2};
+        cv::mixChannels(&stored, 1, &row, 1, from_to.data(), 3);
     }
 
     InputError damaged() const { return bad_picture(file_, "is damaged or cut short: " + *error_); }
@@ -143,9 +147,25 @@ private:
     TiffFile tiff_;
     std::size_t row_bytes_;
     cv::Size tile_;
-    std::vector<uchar> tiles_, grey_;
+    std::vector<uchar> tiles_, stored_;
     int next_ = 0;
 };
+
+/// What libtiff makes 8 bits of R, G, B of.
+cv::Mat3b read_as_8_bits(TIFF* tiff, cv::Size size, const std::string& file, const std::string& error) {
+    if (short_tag(tiff, TIFFTAG_BITSPERSAMPLE) > 8)
+        throw InputError(file + " has a kind of samples that darkbox does not read",
+                         "save it with 8 or 16 bits or as 32-bit float, its colours interleaved");
+    std::vector<std::uint32_t> packed(static_cast<std::size_t>(size.area()));
+    if (::TIFFReadRGBAImageOriented(tiff, static_cast<std::uint32_t>(size.width),
+                                    static_cast<std::uint32_t>(size.height), packed.data(), ORIENTATION_TOPLEFT,
+                                    1) != 1)
+        throw bad_picture(file, "is damaged or cut short: " + error);
+    cv::Mat3b samples(size);
+    std::transform(packed.begin(), packed.end(), samples.begin(),
+                   [](std::uint32_t abgr) { return cv::Vec3b(TIFFGetR(abgr), TIFFGetG(abgr), TIFFGetB(abgr)); });
+    return samples;
+}
 
 }  // namespace
 
@@ -158,8 +178,8 @@ std::unique_ptr<PictureRows> open_tiff_rows(const fs::path& path) {
     const auto width = number_tag(tiff.get(), TIFFTAG_IMAGEWIDTH), height = number_tag(tiff.get(), TIFFTAG_IMAGELENGTH);
     require_sane_size(width, height, file);
     const auto samples = plain_samples(tiff.get());
-    if (!samples) return open_whole_picture(path);
     const cv::Size size(static_cast<int>(width), static_cast<int>(height));
+    if (!samples) return rows_of(read_as_8_bits(tiff.get(), size, file, *error));
     return std::make_unique<TiffRows>(file, size, *samples, std::move(error), std::move(tiff));
 }
 

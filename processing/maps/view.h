@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <limits>
 #include <opencv2/core.hpp>
+#include <optional>
 
 namespace darkbox {
 
@@ -20,6 +21,16 @@ struct ViewGeometry {
     cv::Point2d project(const Eigen::Vector3d& point_mm) const;
     /// Unit vector from a point of the viewer frame (mm) to the camera; (0, 0, 1) when orthographic.
     Eigen::Vector3d to_camera(const Eigen::Vector3d& point_mm) const;
+};
+
+/// Where the surface lies: needed for near lamps, and for the direction to a near camera.
+struct SceneGeometry {
+    std::optional<ViewGeometry> view;  ///< none: unknown, which distant lights can do without
+    cv::Mat1f height_mm;  ///< z of each pixel's point, viewer frame; empty, or not finite at a pixel: z = 0. A first
+                          ///< solution's integrated height refines near lights in a second one.
+
+    /// What a pixel of the picture shows, viewer frame, mm. `view` must be known.
+    Eigen::Vector3d point_at(int row, int column) const;
 };
 
 }  // namespace darkbox

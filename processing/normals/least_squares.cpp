@@ -16,8 +16,8 @@
 namespace darkbox {
 namespace {
 
-/// Leaving clipped samples out may make the lights' geometry this much worse conditioned; beyond it, noise would hurt
-/// more than clipping does.
+/// Leaving clipped samples out may make the lights' geometry this much worse conditioned; beyond it, the rest does not
+/// tell the normal.
 constexpr double max_condition_growth = 4.0;
 
 /// Where in a band a block lies.
@@ -70,6 +70,9 @@ public:
         if (!(eigen.eigenvalues()[2] <= limit * limit * eigen.eigenvalues()[0])) return std::nullopt;
         return (moments.inverse() * projected).cast<float>();
     }
+
+    /// Neither the samples left nor the clipped ones tell this pixel's normal.
+    void leave_out(LeastSquaresBlock& block) const { block.usable.at[i_] = 0.0F; }
 
     /// Puts `g` and the sums that follow from it in place of those over all lights.
     void put(const Eigen::Vector3f& g, LeastSquaresBlock& block) const {
@@ -125,7 +128,10 @@ void leave_out_clipped(const PhotoBand& band, const LightSet& set, Place place,
         });
         if (!clipped) continue;
         const PartialPixel pixel(set, block, i, unclipped_lights(band, set, here, suspects));
-        if (const auto g = pixel.solve()) pixel.put(*g, block);
+        if (const auto g = pixel.solve())
+            pixel.put(*g, block);
+        else
+            pixel.leave_out(block);
     }
 }
 

@@ -24,9 +24,9 @@ struct SolvedMaps {
 };
 
 /// Least squares on one row of a band: g = pinv(L) I from the channel mean, N = g / |g| (Woodham 1980), then albedo per
-/// channel over lit samples. Clipped samples are left out of a pixel where the others still determine its normal well.
-/// Writes the row band.first_row + row of all maps but sigma_deg. Returns how many pixels on the object were left out
-/// for a sample that is not a finite number.
+/// channel over lit samples. Clipped samples are left out; where the others do not determine the normal well there is
+/// no result. Writes the row band.first_row + row of all maps but sigma_deg. Returns how many pixels on the object were
+/// left out for a sample that is not a finite number.
 std::size_t solve_row_least_squares(const PhotoBand& band, const LightSet& set, float min_albedo, int row,
                                     SolvedMaps& maps);
 

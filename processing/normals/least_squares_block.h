@@ -39,7 +39,7 @@ struct LeastSquaresBlock {
     Plane lit_weight;                               ///< sum of (g.L)+^2
     Plane squared;                                  ///< sum of squared residuals
     Plane samples_used;                             ///< lights behind each pixel
-    Plane usable;                                   ///< 1 on the object where all samples are finite, else 0
+    Plane usable;  ///< 1 on the object where all samples are finite and enough of them not clipped, else 0
 };
 
 /// Where a block's results go: the places of its first pixel in the maps.

@@ -10,13 +10,6 @@
 
 namespace darkbox {
 
-Eigen::Vector3d SceneGeometry::point_at(int row, int column) const {
-    double z = 0;
-    if (!height_mm.empty())
-        if (const float known = height_mm(row, column); std::isfinite(known)) z = static_cast<double>(known);
-    return view->point_at(cv::Point2d(column, row), z);
-}
-
 LightField::LightField(const Lights& lights, const LightSet& set, SceneGeometry geometry, cv::Size picture)
     : lights_(lights), set_(set), geometry_(std::move(geometry)) {
     for (const SolverLight& used : set.lights)

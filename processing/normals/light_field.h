@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
-#include <optional>
 #include <vector>
 
 #include "processing/maps/lights.h"
@@ -10,16 +9,6 @@
 #include "processing/normals/light_set.h"
 
 namespace darkbox {
-
-/// Where the surface lies: needed for near lights, and for the direction to a near camera.
-struct SceneGeometry {
-    std::optional<ViewGeometry> view;  ///< none: unknown, which distant lights can do without
-    cv::Mat1f height_mm;  ///< z of each pixel's point, viewer frame; empty, or not finite at a pixel: z = 0. A first
-                          ///< solution's integrated height refines near lights in a second one.
-
-    /// What a pixel of the picture shows, viewer frame, mm. `view` must be known.
-    Eigen::Vector3d point_at(int row, int column) const;
-};
 
 /// Light as it arrives at one pixel.
 struct Arrival {

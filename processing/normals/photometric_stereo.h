@@ -12,7 +12,7 @@
 namespace darkbox {
 
 enum class Solver {
-    lsq,     ///< least squares over all samples that are not clipped
+    lsq,     ///< least squares over all samples that are not clipped; no result where these do not determine a normal
     robust,  ///< leaves out shadows and highlights per pixel: PixelSolver; its model: find_sample_model()
 };
 

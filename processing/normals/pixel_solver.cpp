@@ -276,11 +276,7 @@ std::optional<PixelFit> PixelSolver::solve_least_squares() {
     factor_of_law_ = &lambert;
     gloss_law_ = {};
     for (std::size_t i = 0; i < samples.size(); ++i) weight_[i] = samples.usable[i] ? 1.0F : 0.0F;
-    auto g = weighted_fit();
-    if (!g) {
-        std::fill(weight_.begin(), weight_.end(), 1.0F);
-        g = weighted_fit();
-    }
+    const auto g = weighted_fit();
     if (!g || !(g->norm() > 0)) return std::nullopt;
     return finish(*g, mean_noise_);
 }

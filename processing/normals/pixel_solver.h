@@ -53,8 +53,7 @@ public:
 
     /// None where the samples do not determine a normal.
     std::optional<PixelFit> solve(const BodyFactor& factor, const GlossLaw& gloss = {});
-    /// Plain least squares over all usable samples with Lambert's law; all samples where the usable ones do not
-    /// determine g.
+    /// Plain least squares over all usable samples with Lambert's law; none where they do not determine a normal.
     std::optional<PixelFit> solve_least_squares();
 
     /// After a solve: each sample's weight (relative), and the body's factor in its direction.

@@ -108,9 +108,12 @@ struct Unexplained {
     double relative_rms() const { return squares > 0 ? std::sqrt(std::max(0.0, form.sum()) / squares) : 0; }
 };
 
-/// diag(s) (1 - L (L^T L)^-1 L^T) diag(s), summed over pixels.
+/// diag(s) (1 - L (L^T L)^-1 L^T) diag(s), summed over pixels: a diagonal less the product of one wide matrix, three
+/// columns for each pixel, with itself.
 Unexplained unexplained(const Samples& even, const UsedLights& used, double trim) {
-    Unexplained sum{Eigen::MatrixXd::Zero(even.rows(), even.rows()), 0};
+    Eigen::VectorXd diagonal = Eigen::VectorXd::Zero(even.rows());
+    Eigen::MatrixXd wide = Eigen::MatrixXd::Zero(even.rows(), 3 * even.cols());
+    double squares = 0;
     for (Eigen::Index pixel = 0; pixel < even.cols(); ++pixel) {
         const std::vector<Eigen::Index> kept = kept_samples(even, pixel, trim);
         if (kept.empty()) continue;
@@ -119,25 +122,67 @@ Unexplained unexplained(const Samples& even, const UsedLights& used, double trim
         const Eigen::Matrix3d moments = directions.transpose() * directions;
         const auto count = static_cast<double>(kept.size());
         if (moments.determinant() < least_determinant * count * count * count / 27) continue;
-        const Eigen::Matrix<double, Eigen::Dynamic, 3> scaled = samples.asDiagonal() * directions;
-        Eigen::MatrixXd part = -scaled * moments.inverse() * scaled.transpose();
-        part.diagonal() += samples.cwiseAbs2();
-        sum.squares += samples.squaredNorm();
-        for (std::size_t a = 0; a < kept.size(); ++a)
-            for (std::size_t b = 0; b < kept.size(); ++b)
-                sum.form(kept[a], kept[b]) += part(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b));
+        // With moments = C C^T, the rows of directions C^-T are orthonormal columns.
+        const Eigen::Matrix<double, Eigen::Dynamic, 3> basis =
+            moments.llt().matrixL().solve(directions.transpose()).transpose();
+        for (std::size_t a = 0; a < kept.size(); ++a) {
+            const auto row = static_cast<Eigen::Index>(a);
+            diagonal[kept[a]] += samples[row] * samples[row];
+            wide.block<1, 3>(kept[a], 3 * pixel) = samples[row] * basis.row(row);
+        }
+        squares += samples.squaredNorm();
     }
+    Unexplained sum{diagonal.asDiagonal(), squares};
+    sum.form.selfadjointView<Eigen::Lower>().rankUpdate(wide, -1);
+    sum.form.triangularView<Eigen::StrictlyUpper>() = sum.form.transpose();
     return sum;
+}
+
+/// The smallest eigenvalues of a positive semidefinite form, and the vector of the first.
+struct Smallest {
+    double first = 0;
+    double second = 0;
+    Eigen::VectorXd vector;
+};
+
+/// Inverse iteration on a few vectors at a time, the first of them all ones, which is where factors end up. The whole
+/// decomposition, of which this is the smallest part, takes minutes for a thousand lights.
+Smallest smallest_of(const Eigen::MatrixXd& form) {
+    constexpr Eigen::Index vectors = 8;
+    constexpr int most_steps = 200;
+    constexpr double exact = 1e-12;  // relative to the mean eigenvalue
+    const Eigen::Index n = form.rows();
+    const double mean = form.trace() / static_cast<double>(n);
+    Eigen::MatrixXd shifted = form;
+    shifted.diagonal().array() += 1e-9 * mean;  // what is singular can be solved then
+    const Eigen::LLT<Eigen::MatrixXd> factored(shifted);
+    Eigen::MatrixXd basis = Eigen::MatrixXd::Ones(n, std::min(vectors, n));
+    for (Eigen::Index column = 1; column < basis.cols(); ++column)
+        for (Eigen::Index row = 0; row < n; ++row)
+            basis(row, column) = std::cos(static_cast<double>(column * row * row + column + row));
+    Smallest found;
+    for (int step = 0; step < most_steps; ++step) {
+        const Eigen::MatrixXd solved = factored.solve(basis);
+        basis =
+            Eigen::HouseholderQR<Eigen::MatrixXd>(solved).householderQ() * Eigen::MatrixXd::Identity(n, basis.cols());
+        const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> small(basis.transpose() * form * basis);
+        basis = basis * small.eigenvectors();
+        const Eigen::VectorXd& values = small.eigenvalues();
+        const double change = std::max(std::abs(values[0] - found.first), std::abs(values[1] - found.second));
+        const double off = (form * basis.col(0) - values[0] * basis.col(0)).norm();
+        found = {values[0], values[1], basis.col(0)};
+        if (step > 0 && change <= exact * mean && off <= exact * mean) break;
+    }
+    return found;
 }
 
 /// The factors that leave least; none where several sets of factors leave about the same.
 std::optional<Eigen::VectorXd> best_factors(const Eigen::MatrixXd& form) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(form);
-    const Eigen::VectorXd& values = eigen.eigenvalues();
-    if (!(values[1] > least_gap * values[0] && values[1] > least_second * values.mean())) return std::nullopt;
-    const Eigen::VectorXd factors = eigen.eigenvectors().col(0);
-    if (!(std::abs(factors.mean()) > 0)) return std::nullopt;
-    return factors / factors.mean();
+    const Smallest smallest = smallest_of(form);
+    const double mean = form.trace() / static_cast<double>(form.rows());
+    if (!(smallest.second > least_gap * smallest.first && smallest.second > least_second * mean)) return std::nullopt;
+    if (!(std::abs(smallest.vector.mean()) > 0)) return std::nullopt;
+    return smallest.vector / smallest.vector.mean();
 }
 
 struct ChannelResult {

@@ -45,25 +45,42 @@ Calibration from_given(const GivenLights& given) {
     return calibration;
 }
 
-/// Which stored light belongs to this lamp; by place where lamps have no names in common.
+/// By the lamp's name; by its place only where the caller knows that the lamps are the same ones.
 const Light& stored_light(const StoredCalibration& stored, const FrameRecord& frame, std::size_t place,
-                          const fs::path& file) {
+                          OtherRig other_rig, const fs::path& file) {
     const std::vector<std::string>& lamps = stored.rig.lamps;
     const auto named = std::find(lamps.begin(), lamps.end(), frame.lamp_name);
     if (!frame.lamp_name.empty() && named != lamps.end())
         return stored.calibration.lights[static_cast<std::size_t>(named - lamps.begin())];
-    if (place >= stored.calibration.lights.size())
+    if (other_rig == OtherRig::refuse)
         throw InputError(fmt::format("{} has no light for {}", file.string(), basename_of(frame)),
                          "use a calibration of the same lamps");
     return stored.calibration.lights[place];
 }
 
-Calibration from_stored(const fs::path& from, const std::vector<FrameRecord>& lit) {
+/// Lights of another rig would be taken for this one's, and nothing would look wrong but the normals.
+void require_same_lamps(const StoredCalibration& stored, const RigIdentity& rig, OtherRig other_rig,
+                        const fs::path& file) {
+    if (other_rig == OtherRig::refuse) {
+        if (const std::string why = difference(stored.rig, rig); !why.empty())
+            throw InputError(fmt::format("{} is not a calibration of this session's lamps: {}", file.string(), why),
+                             "use a calibration of the same lamps; if these are the same lamps in the same order, say "
+                             "so with --any-rig");
+    } else if (stored.calibration.lights.size() != rig.lamps.size()) {
+        throw InputError(fmt::format("{} has {} lights for {} frames: their places do not tell which is which",
+                                     file.string(), stored.calibration.lights.size(), rig.lamps.size()),
+                         "use a calibration of as many lamps");
+    }
+}
+
+Calibration from_stored(const fs::path& from, OtherRig other_rig, const RigIdentity& rig,
+                        const std::vector<FrameRecord>& lit) {
     const fs::path file = fs::is_directory(from) ? ResultFiles(from).calibration : from;
     const StoredCalibration stored = read_calibration(file);
+    require_same_lamps(stored, rig, other_rig, file);
     Calibration calibration;
     for (std::size_t i = 0; i < lit.size(); ++i) {
-        calibration.lights.push_back(stored_light(stored, lit[i], i, file));
+        calibration.lights.push_back(stored_light(stored, lit[i], i, other_rig, file));
         calibration.lights.back().file = basename_of(lit[i]);
     }
     calibration.highlights.resize(lit.size());
@@ -72,6 +89,22 @@ Calibration from_stored(const fs::path& from, const std::vector<FrameRecord>& li
     calibration.method = "stored: " + file.string();
     calibration.intensity_origin = stored.calibration.intensity_origin;
     return calibration;
+}
+
+/// Where lights are not read off a ball, what is said about the ball would have no effect.
+void require_effect(const CalibrateOptions& options, const std::string& instead) {
+    const CalibrationOptions& calibration = options.calibration;
+    std::vector<std::string> idle;
+    if (!calibration.balls.empty()) idle.emplace_back("--ball");
+    if (options.ball_mask) idle.emplace_back("--ball-mask");
+    if (calibration.ball_diameter_mm) idle.emplace_back("--ball-diameter");
+    if (!calibration.highlights.empty()) idle.emplace_back("--highlight");
+    if (calibration.lamps != LampModel::automatic) idle.emplace_back("--lamps");
+    if (calibration.method != CalibrationMethod::refined) idle.emplace_back("--method");
+    if (options.photometric) idle.emplace_back("--photometric");
+    if (!idle.empty())
+        throw InputError(fmt::format("{} would have no effect: the lights {}", fmt::join(idle, ", "), instead),
+                         "leave it out, or have the lights read off a ball (--ball X,Y,R, without --from)");
 }
 
 /// A list of balls, or one alone.
@@ -114,16 +147,20 @@ CalibrationOptions with_imported(const Session& session, const CalibrateOptions&
     return options;
 }
 
-/// A lamp that cannot be read is either left out on purpose or an error: results never rest on fewer lamps than the
-/// user knows of.
-void require_highlights(const Calibration& calibration, const std::vector<std::string>& dropped) {
+/// A rig's own lamp that cannot be read is either left out on purpose or an error: results never rest on fewer lamps
+/// than its user knows of. Imported frames go on without it, as calibrate() has warned, while most of them are left.
+void require_highlights(const Session& session, const Calibration& calibration,
+                        const std::vector<std::string>& dropped) {
     std::vector<std::string> unread;
     for (std::size_t i = 0; i < calibration.lights.size(); ++i) {
         const std::string& file = calibration.lights[i].file;
         if (!calibration.highlights[i] && std::find(dropped.begin(), dropped.end(), file) == dropped.end())
             unread.push_back(file);
     }
-    if (unread.empty()) return;
+    const bool imported = session.info().source == "import";
+    const bool enough = direction_matrix(calibration.lights).rows() >= 3 &&
+                        2 * unread.size() < calibration.lights.size() - dropped.size();
+    if (unread.empty() || (imported && enough)) return;
     const Ball ball = calibration.balls.empty() ? Ball{} : calibration.balls.front();
     throw InputError(
         fmt::format("the ball at ({:.1f}, {:.1f}) of radius {:.1f} shows no usable highlight of the lamp in {}", ball.x,
@@ -200,9 +237,13 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
     Stopwatch watch;
     const bool ball_asked_for = !options.calibration.balls.empty() || options.ball_mask;
     const auto given = options.from || ball_asked_for ? std::nullopt : given_lights(session);
+    if (options.other_rig == OtherRig::compare && !options.from)
+        throw InputError("--any-rig would have no effect without --from", "leave it out");
     if (options.from) {
-        summary.calibration = from_stored(*options.from, lit);
+        require_effect(options, "come from " + options.from->string());
+        summary.calibration = from_stored(*options.from, options.other_rig, rig_of(session, lit), lit);
     } else if (given) {
+        require_effect(options, "came with the photographs");
         summary.calibration = from_given(*given);
     } else {
         const BallFrames ball = load_ball_frames(session, work);
@@ -211,7 +252,7 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
         CalibrationOptions wanted = with_geometry(session, with_imported(session, options), ball.frames.front().size());
         if (options.photometric) wanted.object_pixels = pixels_of_object(session, work);
         summary.calibration = calibrate(ball.frames, ball.files, wanted);
-        require_highlights(summary.calibration, options.calibration.drop);
+        require_highlights(session, summary.calibration, options.calibration.drop);
         if (!wanted.object) hold_at_object(session, ball, summary.calibration, work);
         append(summary.calibration.warnings, unused_geometry(session, wanted));
         summary.seconds.solve = watch.lap();
@@ -225,7 +266,8 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
     if (const auto described = described_lights(session))
         append(summary.calibration.warnings,
                against_nominal(*described, {rig_of(session, lit), summary.calibration.lights, false}));
-    remove_derived(session, {"results", "texels", "shading"});
+    summary.removed = remove_derived(session, {"results", "texels", "shading"});
+    if (options.from || given) fs::remove(files.ball_picture);
     write_calibration(files.calibration, summary.calibration, rig_of(session, lit));
     write_lp(files.lights_lp, summary.calibration.lights);
     summary.seconds.write = watch.lap();

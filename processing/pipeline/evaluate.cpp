@@ -107,7 +107,7 @@ public:
         const PhotoStack& photographs = stack();
         step(work_, {"solving normals", 0, 1, std::string(name(solver))});
         PhotometricStereoResult solved = photometric_stereo(photographs, lights_, solving_with(solver), work_);
-        require_any_normal(solved);
+        require_any_normal(solved, photographs);
         return solved;
     }
 

@@ -10,6 +10,8 @@
 #include "processing/formats/light_files.h"
 #include "processing/formats/png.h"
 #include "processing/formats/ptm_file.h"
+#include "processing/maps/parallel.h"
+#include "processing/maps/photo_source.h"
 #include "processing/maps/srgb.h"
 #include "processing/pipeline/radiance.h"
 #include "processing/pipeline/session_files.h"
@@ -23,10 +25,11 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t photographs_at_once = 4;
+constexpr std::size_t band_bytes = std::size_t{128} << 20;  ///< of photographs in memory while texture maps are fitted
 
-cv::Mat sixteen_bit(const cv::Mat3f& image) {
+cv::Mat sixteen_bit(const cv::Mat3f& image, double scale) {
     cv::Mat words;
-    image.convertTo(words, CV_16U, 65535.0);
+    image.convertTo(words, CV_16U, 65535.0 * scale);
     return words;
 }
 
@@ -52,7 +55,14 @@ void require_light_for_each(const Session& session, const Lights& lights) {
             "calibrate the session again");
 }
 
-/// DiLiGenT: 001.png..., and a line per photograph in each list. Lights that cannot be used are left out.
+double peak(const cv::Mat3f& image) {
+    double top = 0;
+    cv::minMaxLoc(image.reshape(1), nullptr, &top);
+    return top;
+}
+
+/// DiLiGenT: 001.png..., and a line per photograph in each list. Lights that cannot be used are left out. A photograph
+/// brighter than 16 bits hold is scaled down, and its intensity with it, by which readers divide.
 void export_diligent(const Session& session, const fs::path& out, const WorkContext& work) {
     const Lights all = load_lights(session);
     require_light_for_each(session, all);
@@ -62,8 +72,10 @@ void export_diligent(const Session& session, const fs::path& out, const WorkCont
     for_each_photograph(session, "exporting", work, [&](std::size_t i, const Radiance& photograph) {
         if (!all[i].used) return;
         lights.push_back(all[i]);
+        const double scale = 1.0 / std::max(1.0, peak(photograph.image));
+        lights.back().intensity *= scale;
         const std::string name = fmt::format("{:03}.png", lights.size());
-        write_png(out / name, sixteen_bit(photograph.image));
+        write_png(out / name, sixteen_bit(photograph.image, scale));
         names += name + "\n";
     });
     write_light_directions(out / "light_directions.txt", lights);
@@ -79,18 +91,46 @@ cv::Mat3f as_shown(const cv::Mat3f& linear) {
     return encoded;
 }
 
+/// Of some rows of all photographs.
+Ptm fitted_band(const PhotoBand& band, const Lights& lights, PtmModel model, const WorkContext& work) {
+    PtmFit fit({band.cols(), band.rows()}, model, lights);
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+        if (!lights[i].used) continue;
+        const Eigen::Vector3d& e = lights[i].intensity;
+        cv::Mat3f relative;
+        cv::divide(radiance_of(band.photos[i]), cv::Scalar(e[0], e[1], e[2]), relative);
+        fit.add(as_shown(relative), i, work);
+    }
+    return fit.result();
+}
+
+/// The photographs pass by in bands of rows: what stays in memory is the result, 9 floats a pixel for lrgb and 18 for
+/// rgb.
 Ptm fitted_ptm(const Session& session, const Lights& lights, PtmModel model, const WorkContext& work) {
     require_light_for_each(session, lights);
-    const FrameRecord like = frames_of_kind(session, FrameKind::lit).front();
-    PtmFit fit({like.width, like.height}, model, lights);
-    for_each_photograph(session, "fitting", work, [&](std::size_t i, const Radiance& photograph) {
-        const Eigen::Vector3d& e = lights[i].intensity;
-        if (!lights[i].used) return;
-        cv::Mat3f relative;
-        cv::divide(photograph.image, cv::Scalar(e[0], e[1], e[2]), relative);
-        fit.add(as_shown(relative), i, work);
-    });
-    return fit.result();
+    FrameBands frames(session, frames_of_kind(session, FrameKind::lit));
+    const cv::Size size = frames.size();
+    const int most_rows = static_cast<int>(std::max<std::size_t>(1, band_bytes / frames.bytes_per_row()));
+    Ptm whole{model, {}, {}};
+    for (cv::Mat& coefficient : whole.coefficient)
+        coefficient.create(size, model == PtmModel::rgb ? CV_32FC3 : CV_32FC1);
+    if (model == PtmModel::lrgb) whole.colour.create(size);
+    PhotoBand band;
+    for (int first = 0; first < size.height; first += most_rows) {
+        const int last = std::min(first + most_rows, size.height);
+        step(work, {"fitting", static_cast<std::size_t>(first), static_cast<std::size_t>(size.height), ""});
+        on_threads_of(work, [&] { frames.read_next(last - first, band); });
+        const Ptm fitted = fitted_band(band, lights, model, work);
+        for (std::size_t t = 0; t < ptm_terms; ++t)
+            fitted.coefficient[t].copyTo(whole.coefficient[t].rowRange(first, last));
+        if (model == PtmModel::lrgb) fitted.colour.copyTo(whole.colour.rowRange(first, last));
+    }
+    return whole;
+}
+
+void export_web(const Session& session, PtmModel model, const fs::path& out, const WorkContext& work) {
+    const Lights lights = load_lights(session);
+    write_relight_web(out, fitted_ptm(session, lights, model, work), lights);
 }
 
 }  // namespace
@@ -101,9 +141,10 @@ ExportFormat export_format(std::string_view name) {
     if (name == "ptm") return ExportFormat::ptm;
     if (name == "ptm-rgb") return ExportFormat::ptm_rgb;
     if (name == "relight") return ExportFormat::relight;
+    if (name == "relight-rgb") return ExportFormat::relight_rgb;
     if (name == "ply") return ExportFormat::ply;
     throw InputError(fmt::format("there is no export format '{}'", name),
-                     "choose one of: lp, diligent, ptm, ptm-rgb, relight, ply");
+                     "choose one of: lp, diligent, ptm, ptm-rgb, relight, relight-rgb, ply");
 }
 
 void export_session(const Session& session, ExportFormat format, const fs::path& out, const WorkContext& work) {
@@ -121,11 +162,12 @@ void export_session(const Session& session, ExportFormat format, const fs::path&
         case ExportFormat::ptm_rgb:
             write_ptm(out, fitted_ptm(session, load_lights(session), PtmModel::rgb, work));
             return;
-        case ExportFormat::relight: {
-            const Lights lights = load_lights(session);
-            write_relight_web(out, fitted_ptm(session, lights, PtmModel::lrgb, work), lights);
+        case ExportFormat::relight:
+            export_web(session, PtmModel::lrgb, out, work);
             return;
-        }
+        case ExportFormat::relight_rgb:
+            export_web(session, PtmModel::rgb, out, work);
+            return;
         case ExportFormat::ply:
             require_made(files.surface, session, "normals");
             write_file(out, read_file(files.surface));

@@ -141,7 +141,7 @@ RelightScene scene_of(const PhotoStack& stack, const Lights& lights, const Photo
     ShadingOptions options;
     options.geometry = geometry;
     ShadingResult shaded = shading_maps(stack, lights, solved.normals, solved.albedo, index, options, work);
-    return {solved.normals, std::move(shaded.albedo), std::move(index), std::move(shaded.maps)};
+    return {solved.normals, std::move(shaded.albedo), std::move(index), std::move(shaded.maps), geometry};
 }
 
 /// Coordinates in the plane across `axis`; no value for a direction that does not meet it.
@@ -169,26 +169,29 @@ const char* name(PixelKind kind) {
     return "";
 }
 
-PredictionErrors mean_errors(const std::vector<HeldOutLight>& lights, std::size_t predictor, LightGroup group) {
-    PredictionErrors means;
-    std::array<std::size_t, pixel_kinds.size()> counts{};
+MeanErrors mean_errors(const std::vector<HeldOutLight>& lights, std::size_t predictor, LightGroup group) {
+    MeanErrors means;
     for (const HeldOutLight& light : lights) {
         const bool inside = group == LightGroup::every || light.hull == (group == LightGroup::hull);
         if (!inside || light.errors.empty()) continue;
-        for (std::size_t kind = 0; kind < means.size(); ++kind) {
-            const auto& error = light.errors[predictor][kind];
-            if (!error) continue;
-            if (!means[kind]) means[kind].emplace();
-            means[kind]->rmse_relative += error->rmse_relative;
-            means[kind]->psnr_db += error->psnr_db;
-            means[kind]->pixels += error->pixels;
-            ++counts[kind];
+        for (std::size_t kind = 0; kind < pixel_kinds.size(); ++kind) {
+            const bool by_all =
+                std::all_of(light.errors.begin(), light.errors.end(),
+                            [kind](const PredictionErrors& errors) { return errors[kind].has_value(); });
+            if (!by_all) continue;
+            auto& mean = means.errors[kind];
+            if (!mean) mean.emplace();
+            const PredictionError& error = *light.errors[predictor][kind];
+            mean->rmse_relative += error.rmse_relative;
+            mean->psnr_db += error.psnr_db;
+            mean->pixels += error.pixels;
+            ++means.photographs[kind];
         }
     }
-    for (std::size_t kind = 0; kind < means.size(); ++kind)
-        if (means[kind]) {
-            means[kind]->rmse_relative /= static_cast<double>(counts[kind]);
-            means[kind]->psnr_db /= static_cast<double>(counts[kind]);
+    for (std::size_t kind = 0; kind < pixel_kinds.size(); ++kind)
+        if (auto& mean = means.errors[kind]) {
+            mean->rmse_relative /= static_cast<double>(means.photographs[kind]);
+            mean->psnr_db /= static_cast<double>(means.photographs[kind]);
         }
     return means;
 }

@@ -65,8 +65,13 @@ std::vector<HeldOutLight> leave_one_light_out(const PhotoStack& stack, const Lig
 
 /// Lights whose photographs are predicted between others, beyond them, or both.
 enum class LightGroup { every, interior, hull };
-/// One predictor's errors averaged over a group's lights that have them (its pixels: the sum).
-PredictionErrors mean_errors(const std::vector<HeldOutLight>& lights, std::size_t predictor, LightGroup group);
+struct MeanErrors {
+    PredictionErrors errors;                                    ///< their pixels: the sum
+    std::array<std::size_t, pixel_kinds.size()> photographs{};  ///< behind each
+};
+/// One predictor's errors averaged over those of a group's photographs that every predictor can predict, so that the
+/// means of all predictors are of the same photographs.
+MeanErrors mean_errors(const std::vector<HeldOutLight>& lights, std::size_t predictor, LightGroup group);
 
 /// For each used light whether it is outside or on the border of the convex hull of all used ones, seen as points of
 /// the plane across their mean direction (gnomonic projection); true for those 90 degrees or more off that mean.

@@ -12,6 +12,7 @@
 #include "processing/formats/atomic_file.h"
 #include "processing/formats/light_files.h"
 #include "processing/formats/picture.h"
+#include "processing/formats/picture_header.h"
 #include "processing/formats/png.h"
 #include "processing/pipeline/given_lights.h"
 #include "processing/pipeline/session_files.h"
@@ -120,7 +121,7 @@ std::optional<fs::path> mask_of(const Survey& survey, const std::optional<fs::pa
                      fmt::format("say which one with {}", option));
 }
 
-/// The mask's bytes when it is a PNG already, else a PNG of it. It must fit the photographs and hold something.
+/// The mask's bytes when it is a PNG already, else a PNG of it. It must fit the photographs.
 Extra mask_extra(const fs::path& path, const char* name, const Inspected& first) {
     const cv::Mat1b mask = read_mask(path);
     const FrameRecord& frame = first.record;
@@ -128,11 +129,8 @@ Extra mask_extra(const fs::path& path, const char* name, const Inspected& first)
         throw InputError(fmt::format("the mask {} is {}x{} pixels but {} is {}x{}", path.string(), mask.cols, mask.rows,
                                      first.source.string(), frame.width, frame.height),
                          "give a mask of the photographs' size");
-    if (cv::countNonZero(mask) == 0)
-        throw InputError(fmt::format("the mask {} is black everywhere", path.string()),
-                         "white is the object in a mask");
     std::vector<std::byte> bytes = read_file(path);
-    if (decode_picture(bytes, path.string()).format != PictureFormat::png) bytes = encode_png(mask);
+    if (require_picture_format(bytes, path.string()) != PictureFormat::png) bytes = encode_png(mask);
     return {name, std::move(bytes)};
 }
 
@@ -269,11 +267,13 @@ Session import_photographs(const ImportOptions& options, const WorkContext& work
         info.geometry.emplace();
         info.geometry->ball_diameter_mm = options.ball_diameter_mm;
     }
-    const bool was_there = fs::exists(options.out);
+    std::error_code ignored;
+    const bool was_there = fs::exists(options.out, ignored);
     try {
         return write_session(info, options.out, all, extras, work);
     } catch (...) {
-        if (!was_there) fs::remove_all(options.out);
+        if (!was_there)  // what went wrong is the news, not that nothing can be removed
+            fs::remove_all(options.out, ignored);
         throw;
     }
 }

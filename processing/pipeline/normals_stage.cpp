@@ -1,7 +1,12 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <tbb/parallel_invoke.h>
 
 #include <algorithm>
+#include <cmath>
+#include <iterator>
 
+#include "acquisition/frame/error.h"
 #include "processing/formats/calibration_file.h"
 #include "processing/formats/exr.h"
 #include "processing/formats/json_file.h"
@@ -13,6 +18,7 @@
 #include "processing/normals/solver_names.h"
 #include "processing/pipeline/angular_error.h"
 #include "processing/pipeline/frame_tally.h"
+#include "processing/pipeline/lights_check.h"
 #include "processing/pipeline/session_files.h"
 #include "processing/pipeline/solved.h"
 #include "processing/pipeline/stack.h"
@@ -24,7 +30,13 @@
 namespace darkbox {
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr int near_light_passes = 2;  ///< more change nothing that can be seen
+
+void append(std::vector<std::string>& to, std::vector<std::string> more) {
+    to.insert(to.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
+}
 
 /// Truth of another size, or of nothing that was solved, is for evaluate to refuse: the normals are good without it.
 std::optional<double> error_against_truth(const Session& session, const NormalMap& normals) {
@@ -102,54 +114,108 @@ void write_maps(const ResultFiles& files, const PhotometricStereoResult& solved,
     });
 }
 
+/// Photographs that show nothing say nothing of normals, and least squares would take them at their word.
+std::vector<std::string> leave_out_black(const FrameTally& tally, const PhotoStack& stack, Lights& lights) {
+    std::vector<std::string> words;
+    for (const std::size_t i : tally.black(lights)) {
+        lights[i].used = false;
+        words.push_back(
+            fmt::format("{} is black wherever the object is, and was left out: was its lamp on?", stack.files[i]));
+    }
+    if (!words.empty() && !(condition_number(lights) < HUGE_VAL))
+        throw InputError(fmt::format("{}; what remains does not tell normals", fmt::join(words, "; ")),
+                         "take the photographs again with all lamps on");
+    return words;
+}
+
+/// What the session's normals come from.
+struct SolvedSession {
+    Calibration calibration;
+    PhotometricStereoResult stereo;
+    std::vector<std::string> warnings;
+    double solve_seconds = 0;
+    double intensity_seconds = 0;
+};
+
+/// Lights that turn out to be useless, and intensities that are found, go into the calibration, where later stages find
+/// them.
+SolvedSession solve_session(SessionPhotos& photos, const fs::path& calibration_file, const NormalsOptions& options,
+                            const WorkContext& work) {
+    StoredCalibration stored = read_calibration(calibration_file);
+    require_solvable(stored.calibration.lights);
+    SolvedSession solved;
+    solved.stereo = solve_normals(photos, stored.calibration, options.stereo, work);
+    solved.solve_seconds = solved.stereo.seconds;
+    const PhotoStack kept = photos.kept_stack();
+    require_any_normal(solved.stereo, kept);
+    FrameTally tally;
+    tally.add(kept, stored.calibration.lights);
+    solved.warnings = leave_out_black(tally, kept, stored.calibration.lights);
+    const bool fewer = !solved.warnings.empty();
+    Stopwatch watch;
+    ChosenIntensities chosen = choose_intensities(kept, std::move(stored.calibration), options.intensities, work);
+    solved.intensity_seconds = watch.lap();
+    solved.calibration = std::move(chosen.calibration);
+    append(solved.warnings, std::move(chosen.warnings));
+    if (chosen.changed || fewer) {
+        write_calibration(calibration_file, solved.calibration, stored.rig);
+        photos.rewind();
+        solved.stereo = solve_normals(photos, solved.calibration, options.stereo, work);
+        solved.solve_seconds += solved.stereo.seconds;
+    }
+    append(solved.warnings, tally.warnings(solved.calibration.lights));
+    return solved;
+}
+
+/// What the photographs themselves say against how they were read or lit. A wrong curve makes lights look wrong, too.
+std::optional<std::string> contradiction(const Session& session, const SessionPhotos& photos, const Lights& lights,
+                                         const WorkContext& work) {
+    if (const auto curve = doubtful_curve(session))
+        if (auto warning = transfer_warning(photos.kept_rows(), photos.kept_mask(), lights, *curve, work))
+            return warning;
+    return lights_warning(photos.kept_stack(), lights);
+}
+
+NormalsSummary summary_of(const Session& session, const SolvedSession& solved, const NormalsOptions& options,
+                          cv::Size size) {
+    const PhotometricStereoResult& stereo = solved.stereo;
+    NormalsSummary summary;
+    summary.intensity_origin = solved.calibration.intensity_origin;
+    summary.lights = solved.calibration.lights;
+    summary.seconds.solve = solved.solve_seconds;
+    summary.intensity_seconds = solved.intensity_seconds;
+    summary.solver = name(options.stereo.solver);
+    summary.body = stereo.model.law.name();
+    summary.gloss = stereo.model.gloss.name();
+    summary.images = static_cast<std::size_t>(direction_matrix(summary.lights).rows());
+    summary.pixels = stereo.pixels;
+    summary.residual_rms = stereo.residual_rms;
+    summary.mean_angular_error_deg = error_against_truth(session, stereo.normals);
+    const double megapixels = static_cast<double>(size.area()) / 1e6;
+    summary.megapixel_images_per_second =
+        megapixels * static_cast<double>(summary.images) / std::max(stereo.seconds, 1e-9);
+    summary.warnings = solved.warnings;
+    return summary;
+}
+
 }  // namespace
 
 NormalsSummary run_normals(const Session& session, const NormalsOptions& options, const WorkContext& work) {
     options.stereo.validate();
     const ResultFiles files(session.folder());
     require_made(files.calibration, session, "calibrate");
-    StoredCalibration stored = read_calibration(files.calibration);
-    require_solvable(stored.calibration.lights);
-    NormalsSummary summary;
     Stopwatch watch;
     SessionPhotos photos(session);
-    PhotometricStereoResult solved = solve_normals(photos, stored.calibration, options.stereo, work);
-    require_any_normal(solved);
-    const ChosenIntensities chosen =
-        choose_intensities(photos.kept_stack(), std::move(stored.calibration), options.intensities, work);
-    const Calibration& calibration = chosen.calibration;
-    const Lights& lights = calibration.lights;
-    if (chosen.changed) {  // later stages find the estimate in the calibration
-        write_calibration(files.calibration, calibration, stored.rig);
-        photos.rewind();
-        solved = solve_normals(photos, calibration, options.stereo, work);
-    }
-    summary.warnings = chosen.warnings;
-    summary.intensity_origin = calibration.intensity_origin;
-    summary.lights = lights;
-    summary.seconds.solve = solved.seconds;
-    summary.seconds.read = std::max(0.0, watch.lap() - solved.seconds);
-    summary.solver = name(options.stereo.solver);
-    summary.body = solved.model.law.name();
-    summary.gloss = solved.model.gloss.name();
-    summary.images = static_cast<std::size_t>(direction_matrix(lights).rows());
-    summary.pixels = solved.pixels;
-    summary.residual_rms = solved.residual_rms;
-    summary.mean_angular_error_deg = error_against_truth(session, solved.normals);
-    const double megapixels = static_cast<double>(photos.size().area()) / 1e6;
-    summary.megapixel_images_per_second =
-        megapixels * static_cast<double>(summary.images) / std::max(solved.seconds, 1e-9);
-    if (const auto curve = doubtful_curve(session))
-        if (const auto warning = transfer_warning(photos.kept_rows(), photos.kept_mask(), lights, *curve, work))
-            summary.warnings.push_back(*warning);
-    FrameTally tally;
-    tally.add(photos.kept_stack());
-    for (std::string& warning : tally.warnings(lights)) summary.warnings.push_back(std::move(warning));
+    const SolvedSession solved = solve_session(photos, files.calibration, options, work);
+    NormalsSummary summary = summary_of(session, solved, options, photos.size());
+    summary.seconds.read = std::max(0.0, watch.lap() - solved.solve_seconds - solved.intensity_seconds);
+    if (auto warning = contradiction(session, photos, summary.lights, work))
+        summary.warnings.push_back(std::move(*warning));
     watch.lap();
-    remove_derived(session, {"texels", "shading"});
-    write_maps(files, solved, work);
+    summary.removed = remove_derived(session, {"texels", "shading"});
+    write_maps(files, solved.stereo, work);
     for (const auto& stale : {files.height, files.surface}) std::filesystem::remove(stale);
-    if (options.surface) summary.height = write_surface(files, solved, calibration.view, work);
+    if (options.surface) summary.height = write_surface(files, solved.stereo, solved.calibration.view, work);
     summary.seconds.write = watch.lap();
     write_json(files.results_summary, to_json(summary));
     step(work, {"writing maps", 1, 1, ""});

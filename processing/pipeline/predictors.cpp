@@ -22,37 +22,6 @@ cv::Mat3f lambert(const HeldOutTraining& training, const Light& light) {
     return image;
 }
 
-/// S(k, r) between its levels.
-cv::Vec3f shading_at(const ShadingMaps& maps, int label, double r) {
-    const double position = std::clamp(r, 0.0, 1.0) * (maps.levels - 1);
-    const int below = std::min(static_cast<int>(position), maps.levels - 2);
-    const auto fraction = static_cast<float>(position - below);
-    const cv::Vec3f* row = maps.radiance[label - 1];
-    return row[below] + fraction * (row[below + 1] - row[below]);
-}
-
-/// What relight() does for distant lights, with the light of a near lamp as it arrives at each pixel.
-cv::Mat3f relit_by_near_lamp(const HeldOutTraining& training, const Light& lamp, Lookup lookup) {
-    const RelightScene& scene = training.scene;
-    cv::Mat3f image(scene.index.label.size(), cv::Vec3f::all(0));
-    for (int y = 0; y < image.rows; ++y)
-        for (int x = 0; x < image.cols; ++x) {
-            const int label = scene.index.label(y, x);
-            if (label == 0 || scene.normals.valid(y, x) == 0) continue;
-            const cv::Vec3f& n = scene.normals.normal(y, x);
-            const Incidence at = incidence(lamp, training.geometry.point_at(y, x));
-            const double r = at.direction.dot(Eigen::Vector3d(n[0], n[1], n[2]));
-            const cv::Vec3f shading = shading_at(scene.shading, label, r);
-            const cv::Vec3f& mean = scene.shading.mean_albedo(label - 1, 0);
-            for (int c = 0; c < 3; ++c) {
-                const bool scaled = lookup == Lookup::detail && mean[c] > 0;
-                const double detail = scaled ? std::max(0.0F, scene.albedo.albedo(y, x)[c] / mean[c]) : 1.0;
-                image(y, x)[c] = static_cast<float>(shading[c] * detail * at.falloff * lamp.intensity[c]);
-            }
-        }
-    return image;
-}
-
 std::optional<cv::Mat3f> polynomial(const HeldOutTraining& training, const Light& light, const WorkContext& work) {
     try {
         cv::Mat3f image = evaluate(fit_ptm(training.stack, training.lights, PtmModel::rgb, work), light.direction);
@@ -89,8 +58,7 @@ Predictor darkbox_predictor(Lookup lookup) {
     RelightOptions options;
     options.lookup = lookup;
     return {lookup == Lookup::thesis ? "darkbox_thesis" : "darkbox_detail",
-            [options, lookup](const HeldOutTraining& training, const Light& light, const WorkContext& work) {
-                if (light.near) return std::optional(relit_by_near_lamp(training, light, lookup));
+            [options](const HeldOutTraining& training, const Light& light, const WorkContext& work) {
                 Light shining = light;
                 shining.used = true;
                 return std::optional(relight(training.scene, {shining}, options, work).image);

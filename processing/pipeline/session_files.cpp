@@ -38,10 +38,13 @@ void require_made(const fs::path& file, const Session& session, const char* comm
                          fmt::format("run 'darkbox {} {}' first", command, session.folder().string()));
 }
 
-void remove_derived(const Session& session, const std::vector<std::string>& folders) {
+std::vector<std::string> remove_derived(const Session& session, const std::vector<std::string>& folders) {
+    std::vector<std::string> removed;
     std::error_code ignored;  // what cannot be removed cannot be written over either, and that is reported
-    for (const std::string& folder : folders) std::filesystem::remove_all(session.folder() / folder, ignored);
-    std::filesystem::remove(session.folder() / "report.html", ignored);
+    for (const std::string& folder : folders)
+        if (fs::remove_all(session.folder() / folder, ignored) > 0 && !ignored) removed.push_back(folder);
+    fs::remove(session.folder() / "report.html", ignored);
+    return removed;
 }
 
 std::vector<FrameRecord> frames_of_kind(const Session& session, FrameKind kind) {

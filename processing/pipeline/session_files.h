@@ -33,7 +33,8 @@ struct ResultFiles {
 void require_made(const std::filesystem::path& file, const Session& session, const char* command);
 
 /// Removes these folders of derived files: they were made from what is about to change. The report goes with them.
-void remove_derived(const Session& session, const std::vector<std::string>& folders);
+/// Returns the folders that were there.
+std::vector<std::string> remove_derived(const Session& session, const std::vector<std::string>& folders);
 
 std::vector<FrameRecord> frames_of_kind(const Session& session, FrameKind kind);
 std::string basename_of(const FrameRecord& frame);

@@ -8,6 +8,7 @@
 #include "acquisition/frame/progress.h"
 #include "acquisition/session/session.h"
 #include "processing/calibration/calibration.h"
+#include "processing/calibration/drift.h"
 #include "processing/calibration/intensity.h"
 #include "processing/formats/ply.h"
 #include "processing/normals/photometric_stereo.h"
@@ -33,19 +34,24 @@ struct CalibrateOptions {
     CalibrationOptions calibration;
     std::optional<std::filesystem::path> ball_mask;  ///< a picture that is white on the ball or balls
     std::optional<std::filesystem::path> from;  ///< a lights.json, or a session that has one: its lights are reused
+    OtherRig other_rig = OtherRig::refuse;      ///< for `from`
     bool photometric = false;                   ///< the object's own diffuse pixels help to refine the lights
     std::optional<GreyCard> grey_card;          ///< in view in the lit frames: tells intensities
     std::optional<std::filesystem::path> grey_card_mask;  ///< a picture that is white on it, instead of its area
 };
 struct CalibrateSummary {
     Calibration calibration;
+    std::vector<std::string> removed;  ///< folders made with the lights of before
     StageSeconds seconds;
 };
 /// Writes calibration/lights.json, lights.lp, ball.png. What the session knows of the rig's geometry serves where the
 /// options leave it open; directions of near lamps hold at the object's centroid (of its mask, which is found without
 /// the balls where none is given; else the picture's centre). Intensities are measured where a grey card or flat frames
 /// allow. Lights that came with the pictures are taken as they are (method "given") unless a ball is given or `from` is
-/// set.
+/// set. Options for reading a ball are refused where none is read. A frame whose lamp the ball does not show is left
+/// out with a warning where the photographs were imported, and an error where a rig took them (docs/decisions/0004).
+/// Lamps of `from` are found by name; where names do not tell, that is an error, or their places do under
+/// OtherRig::compare.
 CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& options = {},
                                const WorkContext& work = {});
 
@@ -77,8 +83,10 @@ struct NormalsSummary {
     std::optional<double> mean_angular_error_deg;  ///< where truth came with the pictures
     std::optional<HeightFacts> height;             ///< none where the surface was left out
     StageSeconds seconds;
+    double intensity_seconds = 0;            ///< of estimating the lamps' intensities
     double megapixel_images_per_second = 0;  ///< of the solver
     std::vector<std::string> warnings;
+    std::vector<std::string> removed;  ///< folders made with the normals of before
 };
 /// Writes results/normals.exr, normals.png, albedo.exr, albedo.png, confidence.exr (lights used, residual, predicted
 /// standard deviation in degrees), height.exr, surface.ply. Intensities that are estimated here go into
@@ -132,6 +140,9 @@ ProcessSummary run_process(const Session& session, const ProcessOptions& options
 RelightScene load_scene(const Session& session);
 /// What relight needs: the same, but its albedo is that under the shading maps (ShadingResult::albedo).
 RelightScene load_shaded_scene(const Session& session);
+/// Where the object's surface lies, for near lamps: the scene's `geometry`. Throws InputError where the session does
+/// not know the scale of its pictures.
+SceneGeometry load_geometry(const Session& session);
 /// What calibration/lights.json holds.
 Calibration load_calibration(const Session& session);
 /// Its lights.

@@ -62,6 +62,7 @@ ordered_json to_json(const CalibrateSummary& summary) {
             {"contour_rms_px", calibration.contour_rms_px},
             {"rejected", calibration.rejected},
             {"warnings", calibration.warnings},
+            {"removed", summary.removed},
             {"seconds", seconds_json(summary.seconds)}};
 }
 
@@ -85,7 +86,9 @@ ordered_json to_json(const NormalsSummary& summary) {
                       {"residual_rms", summary.residual_rms},
                       {"seconds", seconds_json(summary.seconds)},
                       {"megapixel_images_per_second", summary.megapixel_images_per_second},
-                      {"warnings", summary.warnings}};
+                      {"warnings", summary.warnings},
+                      {"removed", summary.removed}};
+    json["seconds"]["intensities"] = summary.intensity_seconds;
     if (summary.height) json["height"] = height_json(*summary.height);
     if (summary.mean_angular_error_deg) json["mean_angular_error_deg"] = *summary.mean_angular_error_deg;
     return json;

@@ -1,5 +1,8 @@
+#include <fmt/format.h>
+
 #include <numeric>
 
+#include "acquisition/frame/error.h"
 #include "processing/formats/json_file.h"
 #include "processing/formats/map_files.h"
 #include "processing/pipeline/session_files.h"
@@ -101,6 +104,17 @@ RelightScene load_shaded_scene(const Session& session) {
     require_made(files.shading_albedo, session, "shade");
     scene.albedo = read_albedo_map(files.shading_albedo, scene.normals.valid);
     return scene;
+}
+
+SceneGeometry load_geometry(const Session& session) {
+    const ResultFiles files(session.folder());
+    require_made(files.calibration, session, "calibrate");
+    SceneGeometry geometry = scene_geometry(files);
+    if (!geometry.view)
+        throw InputError(fmt::format("{} does not know the scale of its pictures, which a near lamp needs",
+                                     session.folder().string()),
+                         "calibrate again with --ball-diameter MM, or give mm_per_pixel in rig.toml");
+    return geometry;
 }
 
 }  // namespace darkbox

@@ -4,7 +4,9 @@
 #include <vector>
 
 #include "acquisition/frame/progress.h"
+#include "processing/maps/lights.h"
 #include "processing/maps/maps.h"
+#include "processing/maps/view.h"
 
 namespace darkbox {
 
@@ -45,6 +47,7 @@ struct RelightScene {
     AlbedoMap albedo;
     IndexMap index;
     ShadingMaps shading;
+    SceneGeometry geometry = {};  ///< for near lamps
 };
 
 /// A light probe: equirectangular linear radiance, R, G, B. Row 0 is straight up (+y), the middle column looks along -z
@@ -70,9 +73,9 @@ struct RelightResult {
 // One picture of a scene. Who needs several prepares a Relighter once.
 
 /// Sum over lights of intensity x S(k, r_i): radiances add, coefficients do not (thesis, relighting). Lights not `used`
-/// are left out; a near lamp lights as from its direction at the object's centroid. Bit-identical on any number of
-/// threads. Throws InputError for maps that do not fit together, normals or directions that are not unit vectors, and
-/// when no light is left.
+/// are left out. A near lamp's direction and fall-off are those at each pixel's point of the surface. Bit-identical on
+/// any number of threads. Throws InputError for maps that do not fit together, normals or directions that are not unit
+/// vectors, a near lamp where the scene's view is not known, and when no light is left.
 RelightResult relight(const RelightScene& scene, const Lights& lights, const RelightOptions& options = {},
                       const WorkContext& work = {});
 

@@ -105,13 +105,22 @@ CompactRows compact_rows(const ScenePixels& pixels, cv::Size size) {
     return result;
 }
 
-std::vector<DistantLight> used_lights(const Lights& lights) {
+FrameLight frame_light(const Light& light) {
+    FrameLight result{{cv::Vec3d(light.direction[0], light.direction[1], light.direction[2]),
+                       cv::Vec3d(light.intensity[0], light.intensity[1], light.intensity[2])},
+                      {}};
+    if (light.near) result.near.emplace(*light.near);
+    return result;
+}
+
+std::vector<FrameLight> used_lights(const Lights& lights, const SceneGeometry& geometry) {
     require_lights(lights);
-    std::vector<DistantLight> used;
-    for (const Light& light : lights)
-        if (light.used)
-            used.push_back({cv::Vec3d(light.direction[0], light.direction[1], light.direction[2]),
-                            cv::Vec3d(light.intensity[0], light.intensity[1], light.intensity[2])});
+    std::vector<FrameLight> used;
+    for (const Light& light : lights) {
+        if (!light.used) continue;
+        if (light.near) require_near_lamp(light, geometry);
+        used.push_back(frame_light(light));
+    }
     return used;
 }
 
@@ -165,7 +174,9 @@ struct Relighter::Prepared {
     }
     Frame frame(const Lights& lights, const RelightOptions& options) const {
         Frame result = frame(options);
-        result.lights = used_lights(lights);
+        result.lights = used_lights(lights, scene.geometry);
+        result.near = std::any_of(result.lights.begin(), result.lights.end(),
+                                  [](const FrameLight& light) { return light.near.has_value(); });
         return result;
     }
     Frame frame(const FoldedEnvironment& environment, const RelightOptions& options) const {
@@ -181,13 +192,23 @@ struct Relighter::Prepared {
         return result;
     }
 
+    const PointBlock* points_of(const Frame& frame, int row, int first_column, PointBlock& storage) const {
+        if (!frame.near) return nullptr;
+        find_points(scene.geometry, row, first_column, storage);
+        return &storage;
+    }
+
     void render(const Frame& frame, cv::Mat3f& into, const WorkContext& work) const {
         require_size("the buffer to render into", into.size(), size());
         on_threads_of(work, [&] {
             tbb::parallel_for(0, into.rows, [&](int y) {
                 RowWriter<float> row(into.ptr<float>(y), into.cols);
                 for (int x = 0; x < into.cols; x += block_pixels)
-                    row.put(x, [&](float* rgb) { shade_to_floats(frame, pixels.block(y, x), rgb); });
+                    row.put(x, [&](float* rgb) {
+                        PointBlock storage;
+                        const PointBlock* points = points_of(frame, y, x, storage);
+                        shade_to_floats(frame, pixels.block(y, x), points, rgb);
+                    });
             });
         });
     }
@@ -198,8 +219,11 @@ struct Relighter::Prepared {
             tbb::parallel_for(0, into.rows, [&](int y) {
                 RowWriter<std::uint8_t> row(into.ptr<std::uint8_t>(y), into.cols);
                 for (const CompactRows::Block& block : compact.rows[static_cast<std::size_t>(y)])
-                    row.put(block.first_column,
-                            [&](std::uint8_t* rgb) { shade_to_bytes(frame, block.pixels, encoding, rgb); });
+                    row.put(block.first_column, [&](std::uint8_t* rgb) {
+                        PointBlock storage;
+                        const PointBlock* points = points_of(frame, y, block.first_column, storage);
+                        shade_to_bytes(frame, block.pixels, points, encoding, rgb);
+                    });
                 row.black_until(into.cols);
             });
         });

@@ -57,9 +57,22 @@ void require_scene(const RelightScene& scene) {
     require_size("the normal map's mask", scene.normals.valid.size(), size);
     require_size("the albedo map", scene.albedo.albedo.size(), size);
     require_size("the albedo map's mask", scene.albedo.valid.size(), size);
+    if (!scene.geometry.height_mm.empty()) require_size("the height map", scene.geometry.height_mm.size(), size);
     require_labels(scene.index);
     require_shading(scene.shading, scene.index.texels);
     require_usable_normals(scene.normals);
+}
+
+void require_near_lamp(const Light& lamp, const SceneGeometry& geometry) {
+    if (!geometry.view)
+        throw InputError(
+            fmt::format("the lamp {} stands near, but where the object's pixels lie is not known", lamp.file),
+            "give the scene's view: millimetres per pixel at the object");
+    const Eigen::Vector3d& position = lamp.near->position_mm;
+    if (!position.allFinite() || !((position - lamp.near->object_mm).norm() > 0))
+        throw InputError(fmt::format("the lamp {} stands at ({}, {}, {}) mm, where no lamp can stand", lamp.file,
+                                     position[0], position[1], position[2]),
+                         "give a place off the object, in millimetres of the viewer frame");
 }
 
 void require_probe(const Environment& environment) {

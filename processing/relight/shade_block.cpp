@@ -121,38 +121,58 @@ inline void put_position(const Frame& frame, const PixelBlock& block, Vector r, 
     if (frame.options.out_of_range == OutOfRange::scale) hn::Store(hn::Max(r, set(1)), d, to.factor + i);
 }
 
+/// Direction and strength of a light at vector i of a block: the same for all, or each pixel's own.
+struct ParallelRays {
+    explicit ParallelRays(const DistantLight& light)
+        : direction_{set(light.direction[0]), set(light.direction[1]), set(light.direction[2])} {}
+
+    Vector direction(int c, std::size_t) const { return direction_[c]; }
+    Vector attenuated(Vector value, std::size_t) const { return value; }
+
+private:
+    Vector direction_[3];
+};
+struct LampRays {
+    const RayBlock& rays;
+
+    Vector direction(int c, std::size_t i) const { return hn::Load(Floats(), rays.direction[c] + i); }
+    Vector attenuated(Vector value, std::size_t i) const {
+        return hn::Mul(value, hn::Load(Floats(), rays.falloff + i));
+    }
+};
+
 /// N.L and (R.V)^n of the models.
+template <class Rays>
 struct Reflection {
-    explicit Reflection(const Frame& frame, const DistantLight& light)
-        : x(set(light.direction[0])),
-          y(set(light.direction[1])),
-          z(set(light.direction[2])),
-          exponent(set(frame.options.phong_exponent)) {}
+    Reflection(const Frame& frame, const Rays& rays_of) : rays(rays_of), exponent(set(frame.options.phong_exponent)) {}
 
     Vector n_dot_l(const PixelBlock& block, std::size_t i) const {
         const Floats d;
-        const Vector xy = hn::MulAdd(hn::Load(d, block.normal[0] + i), x, hn::Mul(hn::Load(d, block.normal[1] + i), y));
-        return hn::MulAdd(hn::Load(d, block.normal[2] + i), z, xy);
+        const Vector along_y = hn::Mul(hn::Load(d, block.normal[1] + i), rays.direction(1, i));
+        const Vector along_xy = hn::MulAdd(hn::Load(d, block.normal[0] + i), rays.direction(0, i), along_y);
+        return hn::MulAdd(hn::Load(d, block.normal[2] + i), rays.direction(2, i), along_xy);
     }
 
     /// 0 where the light is behind the surface.
     Vector highlight(const PixelBlock& block, Vector cosine, std::size_t i) const {
         const Floats d;
         const Vector normal_z = hn::Load(d, block.normal[2] + i);
-        const Vector r_dot_v = hn::Sub(hn::Mul(hn::Mul(set(2), cosine), normal_z), z);
+        const Vector r_dot_v = hn::Sub(hn::Mul(hn::Mul(set(2), cosine), normal_z), rays.direction(2, i));
         const auto visible = hn::And(hn::Gt(r_dot_v, set(1e-30)), hn::Gt(cosine, zero()));
         const Vector power =
             hn::Exp(d, hn::Max(hn::Mul(exponent, hn::Log(d, hn::IfThenElse(visible, r_dot_v, set(1)))), set(-87)));
         return hn::IfThenElseZero(visible, power);
     }
 
-    Vector x, y, z, exponent;
+    const Rays& rays;
+    Vector exponent;
 };
 
-void locate(const Frame& frame, const PixelBlock& block, const DistantLight& light, Positions& positions,
-            Received& received) {
+template <class Rays>
+void locate(const Frame& frame, const PixelBlock& block, const Rays& rays, const cv::Vec3f& intensity,
+            Positions& positions, Received& received) {
     const Floats d;
-    const Reflection reflection(frame, light);
+    const Reflection<Rays> reflection(frame, rays);
     const Vector diffuse = set(frame.options.phong_diffuse), specular = set(frame.options.phong_specular);
     const cv::Vec3d& colour = frame.options.specular_colour;
     switch (frame.options.model) {
@@ -170,11 +190,11 @@ void locate(const Frame& frame, const PixelBlock& block, const DistantLight& lig
             return for_vectors([&](std::size_t i) {
                 const Vector cosine = reflection.n_dot_l(block, i);
                 put_position(frame, block, cosine, i, positions);
-                const Vector highlight =
-                    hn::IfThenElseZero(inside(block, i), hn::Mul(specular, reflection.highlight(block, cosine, i)));
+                const Vector gloss = hn::Mul(specular, reflection.highlight(block, cosine, i));
+                const Vector highlight = hn::IfThenElseZero(inside(block, i), rays.attenuated(gloss, i));
                 for (int c = 0; c < 3; ++c) {
                     float* to = received.mirrored[c] + i;
-                    const Vector more = hn::Mul(set(colour[c] * light.intensity[c]), highlight);
+                    const Vector more = hn::Mul(set(colour[c] * intensity[c]), highlight);
                     hn::Store(hn::Add(hn::Load(d, to), more), d, to);
                 }
             });
@@ -198,15 +218,35 @@ void add_shading(const Frame& frame, const Positions& positions, const cv::Vec3f
     }
 }
 
-void receive_from_lights(const Frame& frame, const PixelBlock& block, Received& received) {
+/// Makes the positions' factors those of the fall-off too.
+void attenuate(const LampRays& rays, bool scaled, Positions& positions) {
+    for_vectors([&](std::size_t i) {
+        const Vector factor = scaled ? hn::Load(Floats(), positions.factor + i) : set(1);
+        hn::Store(rays.attenuated(factor, i), Floats(), positions.factor + i);
+    });
+}
+
+void locate_near(const Frame& frame, const PixelBlock& block, const PointBlock& points, const FrameLight& light,
+                 Positions& positions, Received& received) {
+    RayBlock arriving;
+    find_rays(*light.near, points, arriving);
+    const LampRays rays{arriving};
+    locate(frame, block, rays, light.distant.intensity, positions, received);
+    attenuate(rays, frame.options.out_of_range == OutOfRange::scale, positions);
+}
+
+void receive_from_lights(const Frame& frame, const PixelBlock& block, const PointBlock* points, Received& received) {
     Positions positions;
-    const bool scaled = frame.options.out_of_range == OutOfRange::scale;
     const bool split = frame.options.model == ReflectanceModel::phong_split;
     const float diffuse = split ? static_cast<float>(frame.options.phong_diffuse) : 1.0F;
     if (split) std::fill_n(received.mirrored[0], 3 * block_pixels, 0.0F);
-    for (const DistantLight& light : frame.lights) {
-        locate(frame, block, light, positions, received);
-        const cv::Vec3f intensity = light.intensity * diffuse;
+    for (const FrameLight& light : frame.lights) {
+        if (light.near)
+            locate_near(frame, block, *points, light, positions, received);
+        else
+            locate(frame, block, ParallelRays(light.distant), light.distant.intensity, positions, received);
+        const bool scaled = light.near || frame.options.out_of_range == OutOfRange::scale;
+        const cv::Vec3f intensity = light.distant.intensity * diffuse;
         const bool first = &light == frame.lights.data();
         if (first && scaled) add_shading<true, true>(frame, positions, intensity, received);
         if (first && !scaled) add_shading<true, false>(frame, positions, intensity, received);
@@ -279,7 +319,7 @@ void receive_from_environment(const FoldedEnvironment& environment, const PixelB
 }
 
 /// Returns whether `mirrored` was filled.
-bool receive(const Frame& frame, const PixelBlock& block, Received& received) {
+bool receive(const Frame& frame, const PixelBlock& block, const PointBlock* points, Received& received) {
     if (frame.environment) {
         receive_from_environment(*frame.environment, block, received);
         return !frame.environment->mirrored().empty();
@@ -290,7 +330,7 @@ bool receive(const Frame& frame, const PixelBlock& block, Received& received) {
         add_shading<true, false>(frame, positions, {1, 1, 1}, received);
         return false;
     }
-    receive_from_lights(frame, block, received);
+    receive_from_lights(frame, block, points, received);
     return frame.options.model == ReflectanceModel::phong_split;
 }
 
@@ -344,22 +384,23 @@ void put_bytes(const Frame& frame, const PixelBlock& block, const Received& rece
     });
 }
 
-void to_floats(const Frame& frame, const PixelBlock& block, float* pixels) {
+void to_floats(const Frame& frame, const PixelBlock& block, const PointBlock* points, float* pixels) {
     Received received;
-    const bool mirrored = receive(frame, block, received);
+    const bool mirrored = receive(frame, block, points, received);
     finish(frame, block, received, mirrored, [&](std::size_t i, Vector r, Vector g, Vector b) {
         hn::StoreInterleaved3(r, g, b, Floats(), pixels + 3 * i);
     });
 }
 
-void to_bytes(const Frame& frame, const CompactBlock& compact_block, Encoding encoding, std::uint8_t* pixels) {
+void to_bytes(const Frame& frame, const CompactBlock& compact_block, const PointBlock* points, Encoding encoding,
+              std::uint8_t* pixels) {
     PixelBlock block;
     Received received;
     if (frame.options.model == ReflectanceModel::lambert)
         expand<false>(compact_block, block);
     else
         expand<true>(compact_block, block);
-    const bool mirrored = receive(frame, block, received);
+    const bool mirrored = receive(frame, block, points, received);
     if (encoding == Encoding::srgb)
         put_bytes<Encoding::srgb>(frame, block, received, mirrored, pixels);
     else
@@ -377,12 +418,13 @@ HWY_EXPORT(compact);
 HWY_EXPORT(to_floats);
 HWY_EXPORT(to_bytes);
 
-void shade_to_floats(const Frame& frame, const PixelBlock& block, float* rgb) {
-    HWY_DYNAMIC_DISPATCH(to_floats)(frame, block, rgb);
+void shade_to_floats(const Frame& frame, const PixelBlock& block, const PointBlock* points, float* rgb) {
+    HWY_DYNAMIC_DISPATCH(to_floats)(frame, block, points, rgb);
 }
 
-void shade_to_bytes(const Frame& frame, const CompactBlock& block, Encoding encoding, std::uint8_t* rgb) {
-    HWY_DYNAMIC_DISPATCH(to_bytes)(frame, block, encoding, rgb);
+void shade_to_bytes(const Frame& frame, const CompactBlock& block, const PointBlock* points, Encoding encoding,
+                    std::uint8_t* rgb) {
+    HWY_DYNAMIC_DISPATCH(to_bytes)(frame, block, points, encoding, rgb);
 }
 
 CompactBlock compacted(const PixelBlock& block) {

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <numeric>
+#include <string>
+#include <unordered_set>
+#include <vector>
 
 #include "processing/texels/lloyd.h"
 #include "processing/texels/random.h"
@@ -36,14 +39,29 @@ cv::Mat1f rows_of(const PointSource& points, const std::vector<int>& chosen) {
     return rows;
 }
 
+/// The points that differ from each other, in their order, as many as a sample has at most. A block of points is in
+/// memory at a time.
+cv::Mat1f distinct_points(const PointSource& points) {
+    const auto bytes = static_cast<std::size_t>(points.dimensions()) * sizeof(float);
+    std::unordered_set<std::string> seen;
+    std::vector<int> chosen;
+    for (int first = 0; first < points.count(); first += sample_size) {
+        std::vector<int> block(std::min(sample_size, points.count() - first));
+        std::iota(block.begin(), block.end(), first);
+        const cv::Mat1f rows = rows_of(points, block);
+        for (int i = 0; i < rows.rows && seen.size() < sample_size; ++i)
+            if (seen.emplace(reinterpret_cast<const char*>(rows[i]), bytes).second) chosen.push_back(block[i]);
+    }
+    return rows_of(points, chosen);
+}
+
 /// Good places to start from, found on a sample.
 cv::Mat1f first_centres(const PointSource& points, const KMeansOptions& options) {
     const cv::Mat1f sample = rows_of(points, even_sample(points, options.seed));
     const cv::Mat1f seeds = seed_centres(sample, options.clusters, options.seed);
     if (sample.rows == points.count()) return seeds;
     // Where few points differ, the sample may have missed some.
-    if (seeds.rows < options.clusters)
-        return seed_centres(rows_of(points, all_of(points)), options.clusters, options.seed);
+    if (seeds.rows < options.clusters) return seed_centres(distinct_points(points), options.clusters, options.seed);
     const MatrixPoints sampled(sample);
     Lloyd lloyd(sampled, seeds);
     for (int i = 0; i < std::min(sample_iterations, options.iterations) && lloyd.iterate(); ++i) {

@@ -79,7 +79,7 @@ cv::Mat2i analogies(const MapPyramid& source, MapPyramid target, float white, co
             coordinates = synthesise_level(
                 {source[level], has_coarser ? &source[level + 1] : nullptr, target[level],
                  has_coarser ? &target[level + 1] : nullptr, coordinates, std::ldexp(options.kappa, -level)},
-                space, options.seed, [&](int rows) { progress.rows_done(rows); });
+                space, {options.exact_search, options.seed}, [&](int rows) { progress.rows_done(rows); });
         }
         if (plan.passes == 0) continue;
         const NormalTable table(source[level]);

@@ -66,14 +66,13 @@ private:
     Feature& feature_;
 };
 
-float squared_distance(const Feature& target, const Feature& source) {
+float squared_distance(const Feature& target, const float* source) {
     float sums[lanes] = {};
     const float* a = target.value.data();
-    const float* b = source.value.data();
     const float* known = target.known.data();
     for (std::size_t i = 0; i < target.value.size(); i += lanes)
         for (std::size_t lane = 0; lane < lanes; ++lane) {
-            const float difference = a[i + lane] - b[i + lane];
+            const float difference = a[i + lane] - source[i + lane];
             sums[lane] += known[i + lane] * difference * difference;
         }
     float sum = 0;

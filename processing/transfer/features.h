@@ -15,8 +15,8 @@ struct Feature {
     bool complete = true;      ///< nothing is left out
 };
 
-/// Squared distance from a target's feature to a source's, over what the target has.
-float squared_distance(const Feature& target, const Feature& source);
+/// Squared distance from a target's feature to the numbers of a source's, over what the target has.
+float squared_distance(const Feature& target, const float* source);
 
 /// The feature vector of Image Analogies (Hertzmann et al. 2001, section 3.2): the window of normals around the pixel
 /// and the causal window of albedo before it in scan-line order, and where there is a coarser level the full windows of

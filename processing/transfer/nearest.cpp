@@ -12,7 +12,6 @@
 namespace darkbox {
 namespace {
 
-constexpr std::size_t most_components = 16;
 constexpr std::size_t short_list_length = 8;
 constexpr int most_leaves = 64;
 constexpr std::size_t training_size = 8192;
@@ -37,8 +36,8 @@ Eigen::MatrixXf sample_rows(std::size_t count, const NearestFeatures::Reader& re
 
 }  // namespace
 
-NearestFeatures::NearestFeatures(std::size_t count, const Reader& reader, std::uint64_t seed) {
-    learn_axes(count, reader, seed);
+NearestFeatures::NearestFeatures(std::size_t count, const Reader& reader, std::uint64_t seed, std::size_t components) {
+    learn_axes(count, reader, seed, components);
     PointSet points;
     points.dimensions = static_cast<std::size_t>(axes_.cols());
     points.coordinates.resize(count * points.dimensions);
@@ -55,12 +54,12 @@ NearestFeatures::NearestFeatures(std::size_t count, const Reader& reader, std::u
 /// Principal axes of every n-th vector, from one that the seed picks, by subspace iteration from a random start (Halko
 /// et al. 2011): a few rounds give axes as good as a full decomposition, whose cost grows with the window's sixth
 /// power.
-void NearestFeatures::learn_axes(std::size_t count, const Reader& reader, std::uint64_t seed) {
+void NearestFeatures::learn_axes(std::size_t count, const Reader& reader, std::uint64_t seed, std::size_t components) {
     SplitMix64 random(seed);
     const Eigen::MatrixXf rows = sample_rows(count, reader, random);
     mean_ = rows.colwise().mean().transpose();
     const Eigen::MatrixXf centred = rows.rowwise() - mean_.transpose();
-    axes_.resize(rows.cols(), std::min<Eigen::Index>(most_components, rows.cols()));
+    axes_.resize(rows.cols(), std::min<Eigen::Index>(static_cast<Eigen::Index>(components), rows.cols()));
     for (float& v : axes_.reshaped()) v = static_cast<float>(random.uniform() - 0.5);
     for (int round = 0; round < subspace_rounds; ++round) {
         const Eigen::MatrixXf spread = centred.transpose() * (centred * axes_);

@@ -19,8 +19,12 @@ public:
     /// Writes vector i, of the one length that all have.
     using Reader = std::function<void(std::size_t i, Feature& feature)>;
 
-    /// `count` is at least 1; `seed` picks the sample that the components are learned from.
-    NearestFeatures(std::size_t count, const Reader& reader, std::uint64_t seed);
+    static constexpr std::size_t usual_components = 16;
+
+    /// `count` is at least 1; `seed` picks the sample that the components are learned from. Fewer components take less
+    /// memory, 8 bytes for each and vector, and tell less of what need not be compared.
+    NearestFeatures(std::size_t count, const Reader& reader, std::uint64_t seed,
+                    std::size_t components = usual_components);
 
     /// Those nearest in the tree and there nearer than `squared_radius`; `matches` and `query` are used again.
     void short_list(const Feature& feature, float squared_radius, std::vector<float>& query,
@@ -35,7 +39,7 @@ private:
     Eigen::MatrixXf axes_;  ///< one column for each component
     std::unique_ptr<const KdTree> tree_;
 
-    void learn_axes(std::size_t count, const Reader& reader, std::uint64_t seed);
+    void learn_axes(std::size_t count, const Reader& reader, std::uint64_t seed, std::size_t components);
     void project(const Feature& feature, float* point) const;
 };
 

@@ -35,10 +35,10 @@ std::vector<int> nearest_filled(const std::vector<std::size_t>& first) {
     std::vector<cv::Vec3f> normals;
     for (const int bin : filled) normals.push_back(bin_normal(bin));
     std::vector<int> nearest(normal_bins);
-    for (int bin = 0; bin < normal_bins; ++bin) {
+    tbb::parallel_for(0, normal_bins, [&](int bin) {
         if (first[bin] < first[bin + 1]) {
             nearest[bin] = bin;
-            continue;
+            return;
         }
         const cv::Vec3f normal = bin_normal(bin);
         float best = -2;
@@ -49,7 +49,7 @@ std::vector<int> nearest_filled(const std::vector<std::size_t>& first) {
                 nearest[bin] = filled[i];
             }
         }
-    }
+    });
     return nearest;
 }
 

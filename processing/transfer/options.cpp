@@ -33,6 +33,9 @@ void TransferOptions::validate() const {
     require_range("jitter", jitter, 0.0, 1.0);
     require_range("control_weight", control_weight, 0.0, 100.0);
     require_range("normal_sigma", normal_sigma, 0.0, 64.0);
+    if (exact_search && method != TransferMethod::analogies)
+        throw InputError("transfer: exact_search is of the method analogies only",
+                         "choose that method, or leave it out");
 }
 
 }  // namespace darkbox

@@ -13,6 +13,9 @@ namespace {
 
 /// Numbers of a feature come in as many lanes.
 constexpr std::size_t lanes = 8;
+/// Half the usual: the tree is what takes most memory in a transfer, and half of its components rule out nearly as
+/// much.
+constexpr std::size_t components = 8;
 
 cv::Mat3b encoded_normals(const NormalMap& normals) {
     cv::Mat3b bytes;
@@ -74,7 +77,7 @@ std::optional<double> patch_energy(const PatchLayers& source, const PatchLayers&
         if (p.x % stride == first && p.y % stride == first) targets.push_back(p);
     if (sources.empty() || targets.empty()) return std::nullopt;
     const auto reader = [&](std::size_t i, Feature& patch) { read_patch(source, sources[i], window, patch); };
-    const NearestFeatures nearest(sources.size(), reader, 0);
+    const NearestFeatures nearest(sources.size(), reader, 0, components);
     const int numbers = 3 * window * window;
     std::vector<double> energies(targets.size());
     tbb::parallel_for(std::size_t{0}, targets.size(), [&](std::size_t i) {

@@ -29,13 +29,13 @@ cv::Vec3f turned(const cv::Vec3f& v, const cv::Vec3f& from, const cv::Vec3f& to)
 
 NormalMap moved_relief(const NormalMap& source, const MapLevel& smooth, const cv::Mat2i& coordinates,
                        const NormalMap& target) {
-    NormalMap moved{cv::Mat3f(target.valid.size(), cv::Vec3f(0, 0, 0)), target.valid.clone()};
+    NormalMap moved{cv::Mat3f(target.valid.size()), target.valid.clone()};
     tbb::parallel_for(0, target.valid.rows, [&](int y) {
         for (int x = 0; x < target.valid.cols; ++x) {
+            moved.normal(y, x) = {0, 0, 0};
             if (!target.valid(y, x)) continue;
             const cv::Point at(coordinates(y, x));
-            moved.normal(y, x) =
-                unit(turned(unit(source.normal(at)), unit(smooth.normal(at)), unit(target.normal(y, x))));
+            moved.normal(y, x) = unit(turned(source.normal(at), smooth.normal(at), unit(target.normal(y, x))));
         }
     });
     return moved;

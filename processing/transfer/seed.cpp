@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <vector>
 
 #include "processing/transfer/counter_hash.h"
 
@@ -12,21 +13,88 @@ namespace {
 
 const cv::Vec2i outside(-1, -1);
 
+std::uint32_t random_at(cv::Point p, int spacing, const SeedOptions& options, std::uint64_t purpose) {
+    return counter_hash(static_cast<std::uint32_t>(p.x), static_cast<std::uint32_t>(p.y),
+                        (options.seed * 64 + static_cast<std::uint64_t>(spacing)) * 2 + purpose);
+}
+
+/// A source pixel with about the target's normal at q.
+cv::Point picked_pixel(cv::Point q, int spacing, const NormalTable& table, const MapLevel& target,
+                       const SeedOptions& options) {
+    constexpr std::uint32_t middle = 0x80000000U;
+    const auto offset = static_cast<float>(random_at(q, spacing, options, 1)) - static_cast<float>(middle);
+    const auto jittered = static_cast<std::int64_t>(middle) + static_cast<std::int64_t>(offset * options.jitter);
+    return table.pick(normal_bin(target.normal(q)), static_cast<std::uint32_t>(std::clamp<std::int64_t>(
+                                                        jittered, 0, std::numeric_limits<std::uint32_t>::max())));
+}
+
+/// The jittered points of one grid, one for each of its cells and of those around the picture, and the source pixel
+/// that each picks.
+class SeedGrid {
+public:
+    struct Point {
+        cv::Point at;
+        cv::Point source;  ///< of those in the target
+        bool in_target;
+    };
+
+    SeedGrid(int spacing, const NormalTable& table, const MapLevel& target, const SeedOptions& options)
+        : spacing_(spacing), columns_(target.valid.cols / spacing + 3) {
+        const int rows = target.valid.rows / spacing + 3;
+        points_.resize(static_cast<std::size_t>(columns_) * rows);
+        tbb::parallel_for(0, rows, [&](int j) {
+            for (int i = 0; i < columns_; ++i) {
+                Point& point = points_[static_cast<std::size_t>(j) * columns_ + i];
+                const cv::Point cell(i - 1, j - 1);
+                const std::uint32_t r = random_at(cell, spacing, options, 0);
+                point.at = cell * spacing +
+                           cv::Point(static_cast<int>(r & 0xffffU) % spacing, static_cast<int>(r >> 16) % spacing);
+                point.in_target = target.has(point.at);
+                if (point.in_target) point.source = picked_pixel(point.at, spacing, table, target, options);
+            }
+        });
+    }
+
+    /// Of the nine cells around p.
+    const Point& nearest(cv::Point p) const {
+        const Point* row = points_.data() + static_cast<std::size_t>(p.y / spacing_) * columns_ + p.x / spacing_;
+        const Point* best = nullptr;
+        int nearest = std::numeric_limits<int>::max();
+        for (int j = 0; j < 3; ++j, row += columns_)
+            for (int i = 0; i < 3; ++i) {
+                const cv::Point d = row[i].at - p;
+                const int squared = d.x * d.x + d.y * d.y;
+                if (squared >= nearest) continue;
+                nearest = squared;
+                best = row + i;
+            }
+        return *best;
+    }
+
+private:
+    int spacing_;
+    int columns_;
+    std::vector<Point> points_;
+};
+
 class Seeding {
 public:
     Seeding(const MapLevel& source, const NormalTable& table, const MapLevel& target, const SeedOptions& options)
-        : source_(source), table_(table), target_(target), options_(options) {}
+        : source_(source), table_(table), target_(target), options_(options) {
+        for (int spacing = options.largest_chunk; spacing > 1; spacing /= 2)
+            grids_.emplace_back(spacing, table, target, options);
+    }
 
     cv::Vec2i pixel(cv::Point p) const {
-        for (int spacing = options_.largest_chunk; spacing > 1; spacing /= 2) {
-            const cv::Point q = nearest_grid_point(p, spacing);
-            if (!target_.has(q)) continue;
-            const cv::Point at = picked(q, spacing) + p - q;
+        for (const SeedGrid& grid : grids_) {
+            const SeedGrid::Point& seed = grid.nearest(p);
+            if (!seed.in_target) continue;
+            const cv::Point at = seed.source + p - seed.at;
             if (!source_.has(at)) continue;
             const cv::Vec3f off = source_.normal(at) - target_.normal(p);
             if (off.dot(off) < options_.threshold * options_.threshold) return {at.x, at.y};
         }
-        const cv::Point at = picked(p, 1);
+        const cv::Point at = picked_pixel(p, 1, table_, target_, options_);
         return {at.x, at.y};
     }
 
@@ -35,38 +103,7 @@ private:
     const NormalTable& table_;
     const MapLevel& target_;
     const SeedOptions& options_;
-
-    std::uint32_t random(cv::Point p, int spacing, std::uint64_t purpose) const {
-        return counter_hash(static_cast<std::uint32_t>(p.x), static_cast<std::uint32_t>(p.y),
-                            (options_.seed * 64 + static_cast<std::uint64_t>(spacing)) * 2 + purpose);
-    }
-
-    /// Of the jittered points of the nine grid cells around p.
-    cv::Point nearest_grid_point(cv::Point p, int spacing) const {
-        cv::Point best;
-        int nearest = std::numeric_limits<int>::max();
-        for (int j = -1; j <= 1; ++j)
-            for (int i = -1; i <= 1; ++i) {
-                const cv::Point cell(p.x / spacing + i, p.y / spacing + j);
-                const std::uint32_t r = random(cell, spacing, 0);
-                const cv::Point q = cell * spacing + cv::Point(static_cast<int>(r & 0xffffU) % spacing,
-                                                               static_cast<int>(r >> 16) % spacing);
-                const cv::Point d = q - p;
-                if (d.dot(d) < nearest) {
-                    nearest = d.dot(d);
-                    best = q;
-                }
-            }
-        return best;
-    }
-
-    cv::Point picked(cv::Point q, int spacing) const {
-        constexpr std::uint32_t middle = 0x80000000U;
-        const auto offset = static_cast<float>(random(q, spacing, 1)) - static_cast<float>(middle);
-        const auto jittered = static_cast<std::int64_t>(middle) + static_cast<std::int64_t>(offset * options_.jitter);
-        return table_.pick(normal_bin(target_.normal(q)), static_cast<std::uint32_t>(std::clamp<std::int64_t>(
-                                                              jittered, 0, std::numeric_limits<std::uint32_t>::max())));
-    }
+    std::vector<SeedGrid> grids_;
 };
 
 }  // namespace

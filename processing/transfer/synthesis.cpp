@@ -3,10 +3,9 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <limits>
 #include <vector>
 
-#include "processing/transfer/nearest.h"
+#include "processing/transfer/source_search.h"
 
 namespace darkbox {
 namespace {
@@ -14,40 +13,19 @@ namespace {
 /// Pixels of a row that one task synthesises. At least half a window, which a task needs of the next block above it.
 constexpr int block_width = 16;
 
-std::vector<cv::Point> valid_pixels(const cv::Mat1b& valid) {
-    std::vector<cv::Point> pixels;
-    for (int y = 0; y < valid.rows; ++y)
-        for (int x = 0; x < valid.cols; ++x)
-            if (valid(y, x)) pixels.emplace_back(x, y);
-    return pixels;
-}
-
-struct Candidate {
-    cv::Point source{nowhere, nowhere};
-    float distance = std::numeric_limits<float>::infinity();
-};
-
 /// Memory that the pixels of one task use again.
 struct Scratch {
     Feature target;
-    Feature source;
-    std::vector<float> query;
-    std::vector<Match> matches;
     std::vector<cv::Point> tried;
+    SourceSearch::Scratch search;
 };
 
 class LevelSynthesis {
 public:
-    LevelSynthesis(const SynthesisLevel& level, const FeatureSpace& space, std::uint64_t seed)
+    LevelSynthesis(const SynthesisLevel& level, const FeatureSpace& space, const GlobalMatch& global)
         : level_(level),
           space_(space),
-          sources_(valid_pixels(level.source.valid)),
-          nearest_(
-              sources_.size(),
-              [&](std::size_t i, Feature& feature) {
-                  space.read_source(level.source, level.coarse_source, sources_[i], feature);
-              },
-              seed),
+          search_(level.source, level.coarse_source, space, global.exact, global.seed),
           coordinates_(level.target.valid.size(), cv::Vec2i(nowhere, nowhere)) {}
 
     void block(int y, int b) {
@@ -62,30 +40,25 @@ public:
 private:
     const SynthesisLevel& level_;
     const FeatureSpace& space_;
-    std::vector<cv::Point> sources_;
-    NearestFeatures nearest_;
+    SourceSearch search_;
     cv::Mat2i coordinates_;
 
     void pixel(cv::Point p, Scratch& scratch) {
         space_.read_target(level_.target, level_.coarse_target, p, scratch.target);
         const Candidate coherent = best_coherent(p, scratch);
         const auto tolerance = static_cast<float>(1 + level_.coherence);
-        const Candidate anywhere = best_anywhere(coherent.distance / tolerance, scratch);
+        // Farther ones would lose against the coherent one.
+        const Candidate anywhere = search_.nearest(scratch.target, coherent.distance / tolerance, scratch.search);
         const Candidate& best = coherent.distance <= anywhere.distance * tolerance ? coherent : anywhere;
         coordinates_(p) = cv::Vec2i(best.source.x, best.source.y);
         level_.target.albedo(p) = level_.source.albedo(best.source);
-    }
-
-    float distance_to(cv::Point source, Scratch& scratch) const {
-        space_.read_source(level_.source, level_.coarse_source, source, scratch.source);
-        return squared_distance(scratch.target, scratch.source);
     }
 
     void consider(cv::Point source, Scratch& scratch, Candidate& best) const {
         if (!level_.source.has(source)) return;
         if (std::find(scratch.tried.begin(), scratch.tried.end(), source) != scratch.tried.end()) return;
         scratch.tried.push_back(source);
-        const float distance = distance_to(source, scratch);
+        const float distance = search_.distance_to(source, scratch.target, scratch.search);
         if (distance < best.distance) best = {source, distance};
     }
 
@@ -101,29 +74,15 @@ private:
         }
         return best;
     }
-
-    /// Only matches nearer than `radius` matter: others would lose against the coherent one. What is left out of an
-    /// incomplete feature counts in the tree, so its radius would cut off too much there.
-    Candidate best_anywhere(float radius, Scratch& scratch) const {
-        Candidate best;
-        const float limit = scratch.target.complete ? radius : std::numeric_limits<float>::infinity();
-        nearest_.short_list(scratch.target, limit, scratch.query, scratch.matches);
-        for (const Match& match : scratch.matches) {
-            const cv::Point source = sources_[match.point];
-            const float distance = distance_to(source, scratch);
-            if (distance < best.distance) best = {source, distance};
-        }
-        return best;
-    }
 };
 
 }  // namespace
 
 // Block b of row y reads what is up to half a window away: to the right, no farther than block b + 1 of the rows above.
 // So it may follow block b + 1 of row y - 1, and all blocks with the same 2 y + b are independent of each other.
-cv::Mat2i synthesise_level(const SynthesisLevel& level, const FeatureSpace& space, std::uint64_t seed,
+cv::Mat2i synthesise_level(const SynthesisLevel& level, const FeatureSpace& space, const GlobalMatch& global,
                            const RowsDone& rows_done) {
-    LevelSynthesis synthesis(level, space, seed);
+    LevelSynthesis synthesis(level, space, global);
     const cv::Size size = level.target.valid.size();
     const int blocks = (size.width + block_width - 1) / block_width;
     const int last_step = 2 * (size.height - 1) + blocks - 1;

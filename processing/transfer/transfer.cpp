@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "acquisition/frame/error.h"
 #include "processing/maps/parallel.h"
@@ -102,10 +104,10 @@ MapLevel target_level(const NormalMap& target, double sigma) {
 }
 
 AlbedoMap read_albedo(const AlbedoMap& source, const cv::Mat2i& coordinates, const cv::Mat1b& valid) {
-    AlbedoMap result{cv::Mat3f(valid.size(), cv::Vec3f(0, 0, 0)), valid.clone()};
+    AlbedoMap result{cv::Mat3f(valid.size()), valid.clone()};
     tbb::parallel_for(0, valid.rows, [&](int y) {
         for (int x = 0; x < valid.cols; ++x)
-            if (valid(y, x)) result.albedo(y, x) = source.albedo(cv::Point(coordinates(y, x)));
+            result.albedo(y, x) = valid(y, x) ? source.albedo(cv::Point(coordinates(y, x))) : cv::Vec3f(0, 0, 0);
     });
     return result;
 }
@@ -157,32 +159,57 @@ cv::Mat2i coordinates_by(const MapLevel& source, const MapLevel& target, const C
     return {};
 }
 
+/// The low-passed pair that coordinates are synthesised from.
+struct Guides {
+    MapLevel from;
+    MapLevel onto;
+    float white = 1;
+};
+
+Guides guides_of(const TransferSource& source, const NormalMap& target, double sigma) {
+    Guides guides;
+    tbb::parallel_invoke(
+        [&] {
+            guides.from = source_level(source, sigma);
+            guides.white = white_level({guides.from.albedo, guides.from.valid});
+        },
+        [&] { guides.onto = target_level(target, sigma); });
+    return guides;
+}
+
+/// The same measures as measures.h takes of anybody's result, on a coarser grid. Those that cost memory come after the
+/// guides are gone.
+void measure(const TransferSource& source, const NormalMap& target, Guides guides, int window, TransferResult& result) {
+    result.uncovered_deg = uncovered_deg(guides.from, guides.onto);
+    result.coverage_deg =
+        coverage_deg({guides.from.normal, guides.from.valid}, {guides.onto.normal, guides.onto.valid});
+    guides = {};
+    result.coherence = coherence(result.coordinates);
+    const float white = source.white.value_or(white_level(source.albedo));
+    PatchLayers from, onto;
+    {
+        const Appearance shown = appearance_of(source.normals, source.albedo, white);
+        const Appearance moved = appearance_of(target, result.albedo, white);
+        result.histogram_distance = histogram_distance(shown, moved);
+        from = colour_patches(shown, window);
+        onto = colour_patches(moved, window);
+    }
+    // About a thousand patches, so that it costs little next to the synthesis at any size.
+    const int sparse = std::max(16, std::max(target.valid.cols, target.valid.rows) / 32);
+    result.patch_energy = patch_energy(from, onto, window, sparse);
+}
+
 TransferResult transferred(const TransferSource& source, const NormalMap& target, const ControlMaps& control,
                            const TransferOptions& options, const WorkContext& work) {
     const auto start = std::chrono::steady_clock::now();
-    const MapLevel from = source_level(source, options.normal_sigma);
-    const MapLevel onto = target_level(target, options.normal_sigma);
-    const AlbedoMap exemplar{from.albedo, from.valid};
-    const float white = white_level(exemplar);
-
+    Guides guides = guides_of(source, target, options.normal_sigma);
     TransferResult result;
-    result.coordinates = coordinates_by(from, onto, control, white, options, work);
+    result.coordinates = coordinates_by(guides.from, guides.onto, control, guides.white, options, work);
     result.albedo = read_albedo(source.albedo, result.coordinates, target.valid);
     result.index = read_index(source.index, result.coordinates, target.valid);
-    result.normals = moved_relief(source.normals, from, result.coordinates, target);
+    result.normals = moved_relief(source.normals, guides.from, result.coordinates, target);
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-
-    result.uncovered_deg = uncovered_deg(from, onto);
-    result.coverage_deg = coverage_deg({from.normal, from.valid}, {onto.normal, onto.valid});
-    result.coherence = coherence(result.coordinates);
-    const Appearance shown = appearance_of({from.normal, from.valid}, exemplar, white);
-    const Appearance moved = appearance_of(target, result.albedo, white);
-    // About a thousand patches, so that it costs little next to the synthesis at any size.
-    const int sparse = std::max(16, std::max(target.valid.cols, target.valid.rows) / 32);
-    result.patch_energy = patch_energy(colour_patches(shown, options.window), colour_patches(moved, options.window),
-                                       options.window, sparse)
-                              .value_or(0);
-    result.histogram_distance = histogram_distance(shown, moved).value_or(0);
+    measure(source, target, std::move(guides), options.window, result);
     return result;
 }
 

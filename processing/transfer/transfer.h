@@ -29,6 +29,9 @@ struct TransferOptions {
     /// Refinement of each level, 0...64; 0 = Image Analogies as the thesis has them, or patchmatch's bare seeds. None:
     /// 7 for patchmatch, 16 for analogies.
     std::optional<int> passes;
+    /// analogies: the global match reads every feature of the source in full instead of a short list by principal
+    /// components. For testing: time grows with source times target, half an hour of a core at 512 x 512.
+    bool exact_search = false;
     std::uint64_t seed = 1;  ///< of all random choices
 
     /// Throws InputError that names the field and the allowed range.
@@ -39,6 +42,8 @@ struct TransferSource {
     NormalMap normals;
     AlbedoMap albedo;
     IndexMap index;
+    /// The albedo that is shown as white where that is known, 1 for a picture; none: appearance.h's white_level.
+    std::optional<float> white = {};
 };
 
 /// A guide drawn by the user, beside the normals (Lefebvre and Hoppe 2005, section 4): where the target's map has a
@@ -56,17 +61,16 @@ struct TransferResult {
     cv::Mat1f uncovered_deg;  ///< angle from the target's normal to the nearest of the source's, to a degree or so
     double coverage_deg = 0;  ///< 95th percentile of that angle
     double coherence = 0;     ///< share of neighbouring target pixels whose source coordinates are neighbours alike
-    double patch_energy =
-        0;  ///< RMS over window x window patches to the nearest source patch, in 8-bit units, on a sampled grid
-    double histogram_distance =
-        0;               ///< mean quantile distance per channel between target and source albedo, 8-bit units
+    /// As TransferMeasures has them; patches of the target on a coarser grid. None where there is nothing to measure.
+    std::optional<double> patch_energy;
+    std::optional<double> histogram_distance;
     double seconds = 0;  ///< without the figures
 };
 
 /// Texture replacement: source coordinates are synthesised such that normals and texture fit; albedo, index and fine
 /// relief are read through them. Only valid source pixels are ever used. Bit-identical on any number of threads.
 /// Throws InputError for an empty source or target, for maps that do not fit together or are not finite, and for
-/// control maps with another method than patchmatch; Cancelled.
+/// control maps with another method than patchmatch or an exact search with another than analogies; Cancelled.
 TransferResult transfer_texture(const TransferSource& source, const NormalMap& target,
                                 const TransferOptions& options = {}, const WorkContext& work = {},
                                 const ControlMaps& control = {});

@@ -6,29 +6,22 @@
 #include <filesystem>
 
 #include "acquisition/device/device_error.h"
-#include "acquisition/session/frame_file.h"
-#include "rig/capture/frame_source.h"
-#include "rig/capture/picture_check.h"
+#include "rig/capture/predictive_shots.h"
+#include "rig/capture/settled_shots.h"
+#include "rig/capture/strobed_shots.h"
 
 namespace darkbox {
 namespace {
 
 std::int64_t nanoseconds(TimePoint moment) { return moment.time_since_epoch().count(); }
 
-/// Frames of one switch of the lamps.
-struct Exposure {
-    std::vector<Frame> frames;  ///< all exposed in the steady interval; the first is the shot
-    TimePoint on;               ///< the lamp was confirmed lit (or dark, for a dark shot)
-    TimePoint off;              ///< the lamp was told to go dark
-};
-
 /// A closing dark frame that differed leaves the frames before it in doubt for good.
-void refuse_doubtful(const SessionWriter& writer) {
-    for (const FrameRecord& record : writer.acknowledged())
+void refuse_doubtful(const FrameSink& sink) {
+    for (const FrameRecord& record : sink.kept())
         if (!record.verified)
-            throw InputError(fmt::format("session {} cannot be resumed: frame {} failed: {}", writer.folder().string(),
-                                         record.file, record.verification),
-                             "its frames may be lit by more than their lamp: capture a new session");
+            throw InputError(
+                fmt::format("the session cannot be resumed: frame {} failed: {}", record.file, record.verification),
+                "its frames may be lit by more than their lamp: capture a new session");
 }
 
 void validate(const CapturePlan& plan, const RigDescription& rig, const LampArray& lamps) {
@@ -59,27 +52,33 @@ void validate(const CapturePlan& plan, const RigDescription& rig, const LampArra
 /// One run of a plan; see run_capture(). The lamps go dark before the camera stops: a camera may hang while it does.
 class Run {
 public:
-    Run(const CapturePlan& plan, const RigDescription& rig, LampArray& lamps, Camera& camera, Clock& clock,
-        SessionWriter& writer, const WorkContext& work)
+    Run(const CapturePlan& plan, const RigDescription& rig, const CaptureDevices& devices, FrameSink& sink,
+        const WorkContext& work, const TimingLookup& timings)
         : plan_(plan),
           rig_(rig),
-          lamps_(lamps),
-          clock_(clock),
-          writer_(writer),
+          clock_(devices.clock),
+          sink_(sink),
           work_(work),
-          source_(camera, clock, plan.shots.front().camera, work),
-          dark_on_exit_(lamps),
-          check_(source_.info(), rig.capture) {}
+          source_(devices.camera, devices.clock, plan.shots.front().camera, work, timings),
+          lamps_(devices.lamps, devices.clock, rig),
+          check_(source_.info(), rig.capture),
+          settled_(rig, lamps_, source_, check_, devices.clock) {}
 
     CaptureSummary all() {
-        for (const Shot& shot : plan_.shots) {
-            if (is_acknowledged(shot)) {
-                ++summary_.resumed;
+        for (auto shot = plan_.shots.begin(); shot != plan_.shots.end();) {
+            const auto ahead = stretch_from(shot);
+            if (ahead.size() > 1) {
+                take_ahead(ahead);
+                shot += static_cast<std::ptrdiff_t>(ahead.size());
                 continue;
             }
-            tell(shot.lamp ? lamp(shot).name : "dark");
-            if (!check_.has_dark() && summary_.resumed > 0) compare_with_interrupted_run(shot.camera);
-            keep(shot);
+            if (is_kept(*shot)) {
+                ++summary_.resumed;
+            } else {
+                prepare(*shot);
+                take_settled(*shot);
+            }
+            ++shot;
         }
         lamps_.dark();
         tell("");
@@ -94,20 +93,66 @@ private:
             {"capture", static_cast<std::size_t>(summary_.taken + summary_.resumed), plan_.shots.size(), detail});
     }
 
-    bool is_acknowledged(const Shot& shot) const {
-        const auto& records = writer_.acknowledged();
+    bool is_kept(const Shot& shot) const {
+        const auto& records = sink_.kept();
         return std::any_of(records.begin(), records.end(), [&](const FrameRecord& record) {
             return std::filesystem::path(record.file).stem() == shot.name && record.kind == shot.kind &&
                    record.lamp == shot.lamp;
         });
     }
 
+    /// The lit shots from here on that can be taken without a stop; none in settled mode.
+    std::span<const Shot> stretch_from(std::vector<Shot>::const_iterator shot) const {
+        if (mode_ == SyncMode::settled) return {};
+        const auto end = std::find_if(shot, plan_.shots.end(), [&](const Shot& s) { return !s.lamp || is_kept(s); });
+        return {shot, end};
+    }
+
+    void prepare(const Shot& shot) {
+        tell(shot.lamp ? lamp(shot).name : "dark");
+        if (!check_.has_dark() && summary_.resumed > 0) compare_with_interrupted_run(shot.camera);
+        wait_for_room();
+    }
+
+    /// A disk that does not keep up is waited for in the dark; the sink says when it was too long.
+    void wait_for_room() {
+        if (sink_.has_room()) return;
+        lamps_.dark();
+    }
+
+    void take_ahead(std::span<const Shot> shots) {
+        prepare(shots.front());
+        const Unproven left = take_without_stops(shots);
+        for (const std::string& reason : left.reasons)
+            sink_.note_event(fmt::format("{} mode: {}", name(mode_), reason));
+        if (left.stay_settled) mode_ = SyncMode::settled;
+        for (const Shot& shot : left.shots) {
+            if (!left.stay_settled) ++summary_.repeated;
+            prepare(shot);
+            take_settled(shot);
+        }
+    }
+
+    Unproven take_without_stops(std::span<const Shot> shots) {
+        source_.recover(to_nanoseconds(rig_.capture.frame_deadline));
+        const ShotSink proven = [&](const Shot& shot, TakenShot taken) {
+            wait_for_room();
+            tell(lamp(shot).name);
+            add(shot, std::move(taken));
+        };
+        Unproven left = mode_ == SyncMode::strobed
+                            ? StrobedShots(rig_, lamps_, source_, check_, clock_).take(shots, proven)
+                            : PredictiveShots(rig_, lamps_, source_, check_, clock_).take(shots, proven);
+        note_lost(shots.front());
+        return left;
+    }
+
     /// The dark frame of the interrupted run goes on being the reference. One more is taken and looked at, not kept: it
     /// shows a lamp that got stuck or a door that was opened in the meantime.
     void compare_with_interrupted_run(const CameraConfig& config) {
-        for (const FrameRecord& record : writer_.acknowledged()) {
+        for (const FrameRecord& record : sink_.kept()) {
             if (record.kind != FrameKind::dark) continue;
-            const Frame dark = read_frame(writer_.folder() / "data" / record.file, record);
+            const Frame dark = sink_.read(record);
             check_same_camera(dark);
             check_.accept_dark(dark);
             break;
@@ -127,28 +172,29 @@ private:
                          "connect the camera that the session was begun with, or capture a new session");
     }
 
-    /// What a shot's checks came to.
-    struct Verdict {
-        bool verified = true;
-        std::string words;
-    };
-
-    void keep(const Shot& shot) {
+    /// A closing dark frame that goes on differing is kept as well: it shows what went wrong.
+    void take_settled(const Shot& shot) {
         try {
-            add(shot, {true, take(shot)});
+            add(shot, take(shot));
         } catch (const DarkDiffers& error) {
-            add(shot, {false, error.what()});
+            if (auto differing = settled_.take_refused()) {
+                differing->words = error.what();
+                add(shot, std::move(*differing), Verified::no);
+            }
             if (plan_.closing_dark_differs_is_error) throw;
         }
     }
 
-    void add(const Shot& shot, const Verdict& verdict) {
-        writer_.add(exposed_.frames.front(), record_of(shot, verdict));
+    enum class Verified { no, yes };
+    void add(const Shot& shot, TakenShot taken, Verified verified = Verified::yes) {
+        FrameRecord record = record_of(shot, taken);
+        record.verified = verified == Verified::yes;
+        sink_.add(std::move(taken.frame), std::move(record));
         ++summary_.taken;
     }
 
-    FrameRecord record_of(const Shot& shot, const Verdict& verdict) const {
-        const Frame& frame = exposed_.frames.front();
+    FrameRecord record_of(const Shot& shot, const TakenShot& taken) const {
+        const Frame& frame = taken.frame;
         FrameRecord record;
         record.file = "frames/" + shot.name + ".tif";
         record.kind = shot.kind;
@@ -159,56 +205,38 @@ private:
         record.timestamp_ns = nanoseconds(frame.timestamp);
         if (shot.lamp) {
             record.lamp_name = lamp(shot).name;
-            record.lamp_on_ns = nanoseconds(exposed_.on);
-            record.lamp_off_ns = nanoseconds(exposed_.off);
+            record.lamp_on_ns = nanoseconds(taken.on);
+            record.lamp_off_ns = nanoseconds(taken.off);
         }
-        record.verified = verdict.verified;
-        record.verification = verdict.words;
+        record.verification = taken.words;
         return record;
     }
 
-    /// Tries until a frame passes every check, at most rig.capture.tries times. The frame is in exposed_; what was
-    /// found comes back in words.
-    std::string take(const Shot& shot) {
+    /// Tries until a frame passes every check, at most rig.capture.tries times.
+    TakenShot take(const Shot& shot) {
         for (int number = 1;; ++number) {
             try {
-                return take_once(shot);
+                source_.recover(to_nanoseconds(rig_.capture.frame_deadline));
+                TakenShot taken = settled_.take(shot);
+                note_lost(shot);
+                return taken;
             } catch (const DeviceError& error) {
                 reject(shot, number, error);
             } catch (const DarkDiffers& error) {
                 reject(shot, number, error);
-                distrust_timestamps();
+                settled_.distrust_timestamps();
             } catch (const InputError& error) {
                 reject(shot, number, error);
-                distrust_timestamps();
+                settled_.distrust_timestamps();
             }
         }
-    }
-
-    /// A picture contradicted its timestamps: from here on the run waits longer after every switch, but never longer
-    /// than the camera can hold pictures back.
-    void distrust_timestamps() {
-        constexpr int spare_frames = 4;
-        const auto held_back =
-            frame_time() * (source_.info().queue_depth + source_.info().latency_frames + spare_frames);
-        margin_ = std::min<Nanoseconds>(2 * margin_ + frame_time(), held_back);
-    }
-
-    std::string take_once(const Shot& shot) {
-        source_.recover();
-        exposed_ = expose(shot);
-        const std::string found = shot.lamp
-                                      ? check_.accept_lit(lamp(shot).name, exposed_.frames.at(0), exposed_.frames.at(1))
-                                      : check_.accept_dark(exposed_.frames.front());
-        const double after = to_seconds(exposed_.frames.front().exposure.begin - exposed_.on);
-        return fmt::format("exposed {:.1f} ms after the switch, within the steady time; {}", after * 1000.0, found);
     }
 
     template <typename Kind>
     void reject(const Shot& shot, int number, const Kind& error) {
         ++summary_.repeated;
         lamps_.dark();
-        writer_.note_event(fmt::format("{}: try {} of {}: {}", shot.name, number, rig_.capture.tries, error.what()));
+        sink_.note_event(fmt::format("{}: try {} of {}: {}", shot.name, number, rig_.capture.tries, error.what()));
         if (number < rig_.capture.tries) return;
         const std::string who = shot.lamp ? fmt::format("lamp '{}', frame {}", lamp(shot).name, shot.name)
                                           : fmt::format("all lamps dark, frame {}", shot.name);
@@ -216,84 +244,32 @@ private:
                    error.hint());
     }
 
-    Exposure expose(const Shot& shot) {
-        const std::size_t wanted = shot.lamp ? 2 : 1;  // the second confirms the first
-        stop_when_asked(work_);
-        Exposure exposure;
-        if (shot.lamp)
-            lamps_.light(*shot.lamp, 1.0);
-        else
-            lamps_.dark();
-        exposure.on = clock_.now();
-        const TimePoint steady = exposure.on + settle(shot) + margin_;
-        const TimePoint deadline = deadline_of(shot, exposure.on, steady);
-        try {
-            while (exposure.frames.size() < wanted) exposure.frames.push_back(source_.first_after(steady, deadline));
-        } catch (const DeadlineError&) {
-            refuse_overlong(shot, exposure.on);
-            throw;
-        }
-        exposure.off = clock_.now();
-        lamps_.dark();
-        last_lamp_ = shot.lamp;
-        note_lost(shot);
-        return exposure;
-    }
-
-    /// The lamp before this one must have faded, too.
-    Nanoseconds settle(const Shot& shot) const {
-        const auto settle_of = [&](std::optional<LampId> id) {
-            return id ? rig_.lamps.at(id->value).settle : Seconds(0);
-        };
-        return to_nanoseconds(std::max(settle_of(shot.lamp), settle_of(last_lamp_)));
-    }
-
-    Nanoseconds frame_time() const {
-        return to_nanoseconds(std::max(source_.info().frame_period, source_.info().controls.exposure));
-    }
-
-    /// A camera that works needs the queued frames and two more; one that hangs is given frame_deadline besides. A
-    /// lamp is never left on for longer than it bears.
-    TimePoint deadline_of(const Shot& shot, TimePoint on, TimePoint steady) const {
-        const TimePoint patience =
-            steady + frame_time() * (source_.info().queue_depth + 4) + to_nanoseconds(rig_.capture.frame_deadline);
-        return shot.lamp ? std::min(patience, on + to_nanoseconds(lamp(shot).max_on)) : patience;
-    }
-
-    void refuse_overlong(const Shot& shot, TimePoint on) const {
-        if (!shot.lamp || clock_.now() < on + to_nanoseconds(lamp(shot).max_on)) return;
-        throw DeadlineError(fmt::format("no frame came within the lamp's max_on_s of {} s", lamp(shot).max_on.count()),
-                            "check the camera, or raise max_on_s of the lamp if it bears that");
-    }
-
     void note_lost(const Shot& shot) {
         const std::uint64_t lost = source_.take_lost();
-        if (lost > 0) writer_.note_event(fmt::format("{}: the camera lost {} frames before this one", shot.name, lost));
+        if (lost > 0) sink_.note_event(fmt::format("{}: the camera lost {} frames before this one", shot.name, lost));
     }
 
     const CapturePlan& plan_;
     const RigDescription& rig_;
-    LampArray& lamps_;
     Clock& clock_;
-    SessionWriter& writer_;
+    FrameSink& sink_;
     const WorkContext& work_;
     FrameSource source_;
-    DarkOnExit dark_on_exit_;
+    TimedLamps lamps_;
     PictureCheck check_;
-    Exposure exposed_;  ///< of the latest try
+    SettledShots settled_;
+    SyncMode mode_ = rig_.capture.mode;  ///< at present
     CaptureSummary summary_;
-    std::optional<LampId> last_lamp_;
-    Nanoseconds margin_{0};  ///< waited besides the settle time, since pictures came later than their timestamps
 };
 
 }  // namespace
 
-CaptureSummary run_capture(const CapturePlan& plan, const RigDescription& rig, LampArray& lamps, Camera& camera,
-                           Clock& clock, SessionWriter& writer, const WorkContext& work) {
-    validate(plan, rig, lamps);
-    if (plan.closing_dark_differs_is_error) refuse_doubtful(writer);
-    lamps.dark();
-    return Run(plan, rig, lamps, camera, clock, writer, work).all();
+CaptureSummary run_capture(const CapturePlan& plan, const RigDescription& rig, const CaptureDevices& devices,
+                           FrameSink& sink, const WorkContext& work, const TimingLookup& timings) {
+    validate(plan, rig, devices.lamps);
+    if (plan.closing_dark_differs_is_error) refuse_doubtful(sink);
+    devices.lamps.dark();
+    return Run(plan, rig, devices, sink, work, timings).all();
 }
 
 }  // namespace darkbox

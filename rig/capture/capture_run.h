@@ -8,19 +8,13 @@
 #include "acquisition/camera/camera.h"
 #include "acquisition/device/clock.h"
 #include "acquisition/frame/progress.h"
-#include "acquisition/session/session_writer.h"
+#include "rig/capture/frame_sink.h"
+#include "rig/capture/frame_source.h"
+#include "rig/capture/taken_shot.h"
 #include "rig/description/rig_description.h"
 #include "rig/lamps/lamp_array.h"
 
 namespace darkbox {
-
-/// One picture to take.
-struct Shot {
-    FrameKind kind = FrameKind::lit;
-    std::optional<LampId> lamp;  ///< none: all dark
-    CameraConfig camera;
-    std::string name;  ///< of the file: "0003_lamp-04"
-};
 
 /// A validated list of shots: dark, every lamp, dark again.
 struct CapturePlan {
@@ -37,11 +31,19 @@ struct CaptureSummary {
     int repeated = 0;  ///< exposures thrown away and taken again
 };
 
-/// Takes every shot of the plan that the writer does not hold yet; each frame is proven to be lit by its lamp before it
-/// is acknowledged: by its timestamps against the lamp's steady interval, then by the picture (see picture_check.h),
-/// which a second exposure under the same lamp confirms. Lamps are dark when it returns or
-/// throws. Does not seal. Throws Cancelled, DeviceError, or InputError naming lamp, frame and cause.
-CaptureSummary run_capture(const CapturePlan& plan, const RigDescription& rig, LampArray& lamps, Camera& camera,
-                           Clock& clock, SessionWriter& writer, const WorkContext& work = {});
+/// The devices that a run drives.
+struct CaptureDevices {
+    LampArray& lamps;
+    Camera& camera;
+    Clock& clock;
+};
+
+/// Takes every shot of the plan that the sink does not hold yet, at the speed that rig.capture.mode asks for. Each
+/// frame is proven to be lit by its lamp before it goes to the sink: by its timestamps against the lamp's steady
+/// interval, then by the picture (see picture_check.h, switch_witness.h). Lamps are dark when it returns or throws.
+/// `timings`: where exposures lie beside their timestamps, where that was measured.
+/// Throws Cancelled, DeviceError, or InputError naming lamp, frame and cause.
+CaptureSummary run_capture(const CapturePlan& plan, const RigDescription& rig, const CaptureDevices& devices,
+                           FrameSink& sink, const WorkContext& work = {}, const TimingLookup& timings = {});
 
 }  // namespace darkbox

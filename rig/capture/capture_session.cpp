@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "acquisition/frame/error.h"
+#include "rig/capture/session_recorder.h"
 
 namespace darkbox {
 namespace {
@@ -110,11 +111,18 @@ SessionInfo session_info(const RigDescription& rig, const CameraInfo& camera, co
     return info;
 }
 
-CapturedSession capture_session(const CaptureRequest& request, const RigDescription& rig, LampArray& lamps,
-                                Camera& camera, Clock& clock, const WorkContext& work) {
+CapturedSession capture_session(const CaptureRequest& request, const RigDescription& description, LampArray& lamps,
+                                Camera& camera, Clock& clock, const WorkContext& work, const TimingLookup& timings) {
     const DarkOnExit dark_on_exit(lamps);
+    RigDescription rig = description;
+    rig.capture.mode = request.mode.value_or(rig.capture.mode);
     Begun begun = request.start == CaptureStart::create ? create(request, rig, camera) : resume(request, rig);
-    const CaptureSummary summary = run_capture(begun.plan, rig, lamps, camera, clock, begun.writer, work);
+    CaptureSummary summary;
+    {
+        SessionRecorder recorder(begun.writer);
+        summary = run_capture(begun.plan, rig, {lamps, camera, clock}, recorder, work, timings);
+        recorder.finish();
+    }
     return {begun.writer.seal(), summary};
 }
 

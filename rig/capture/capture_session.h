@@ -18,6 +18,7 @@ struct CaptureRequest {
     std::string object;              ///< name given by the user; a resumed session keeps its own
     std::vector<std::string> lamps;  ///< names; empty = all, or the interrupted session's own
     CaptureStart start = CaptureStart::create;
+    std::optional<SyncMode> mode = {};  ///< none: the one of rig.toml
 };
 
 struct CapturedSession {
@@ -36,6 +37,7 @@ SessionInfo session_info(const RigDescription& rig, const CameraInfo& camera, co
 /// it returns or throws; whatever was acknowledged stays and can be resumed. Throws what run_capture() throws, and
 /// InputError when an interrupted session was begun with another rig.toml or other lamps.
 CapturedSession capture_session(const CaptureRequest& request, const RigDescription& rig, LampArray& lamps,
-                                Camera& camera, Clock& clock, const WorkContext& work = {});
+                                Camera& camera, Clock& clock, const WorkContext& work = {},
+                                const TimingLookup& timings = {});
 
 }  // namespace darkbox

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <utility>
 
 #include "acquisition/device/device_error.h"
@@ -15,6 +16,11 @@ namespace {
 constexpr Nanoseconds slice = std::chrono::milliseconds(50);
 /// Exposure and gain are read back from hardware in steps of its own.
 constexpr double control_tolerance = 0.001;
+
+/// More than a queue is deep.
+constexpr std::size_t pictures_kept = 40;
+/// A stamp may be late, and the exposure seem to end that much later: this part of a period.
+constexpr int late_stamps = 20;
 
 constexpr const char* damaged_hint = "check the camera's cable and the load on its bus";
 
@@ -29,31 +35,38 @@ void stop_when_asked(const WorkContext& work) {
 
 void check_frame(const Frame& frame, const CameraInfo& camera) {
     if (frame.status != FrameStatus::good)
-        throw DeviceError(fmt::format("frame {} is flagged as {} by the camera's driver", frame.sequence,
-                                      frame.status == FrameStatus::error ? "damaged" : "truncated"),
-                          damaged_hint);
+        throw DamagedFrame(fmt::format("frame {} is flagged as {} by the camera's driver", frame.sequence,
+                                       frame.status == FrameStatus::error ? "damaged" : "truncated"),
+                           damaged_hint);
     const std::size_t wanted = static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height) *
                                static_cast<std::size_t>(channels(camera.format) * bytes_per_sample(camera.format));
     if (frame.width != camera.width || frame.height != camera.height || frame.format != camera.format ||
         frame.bit_depth != camera.bit_depth)
-        throw DeviceError(fmt::format("frame {} is {}x{} {} of {} bits, but the camera is set to {}x{} {} of {} bits",
-                                      frame.sequence, frame.width, frame.height, name(frame.format), frame.bit_depth,
-                                      camera.width, camera.height, name(camera.format), camera.bit_depth),
-                          "another program may have changed the camera's format; stop it first");
+        throw DamagedFrame(fmt::format("frame {} is {}x{} {} of {} bits, but the camera is set to {}x{} {} of {} bits",
+                                       frame.sequence, frame.width, frame.height, name(frame.format), frame.bit_depth,
+                                       camera.width, camera.height, name(camera.format), camera.bit_depth),
+                           "another program may have changed the camera's format; stop it first");
     if (frame.pixels.size() != wanted)
-        throw DeviceError(
+        throw DamagedFrame(
             fmt::format("frame {} is truncated: {} of {} bytes", frame.sequence, frame.pixels.size(), wanted),
             damaged_hint);
     if (!near(frame.controls.exposure.count(), camera.controls.exposure.count()) ||
         !near(frame.controls.gain, camera.controls.gain))
-        throw DeviceError(fmt::format("frame {} was exposed for {} s at gain {}, not for {} s at gain {}",
-                                      frame.sequence, frame.controls.exposure.count(), frame.controls.gain,
-                                      camera.controls.exposure.count(), camera.controls.gain),
-                          "another program may have changed the camera's controls; stop it first");
+        throw DamagedFrame(fmt::format("frame {} was exposed for {} s at gain {}, not for {} s at gain {}",
+                                       frame.sequence, frame.controls.exposure.count(), frame.controls.gain,
+                                       camera.controls.exposure.count(), camera.controls.gain),
+                           "another program may have changed the camera's controls; stop it first");
 }
 
-FrameSource::FrameSource(Camera& camera, Clock& clock, const CameraConfig& config, const WorkContext& work)
-    : camera_(camera), clock_(clock), work_(work), info_(camera.configure(config)) {
+FrameSource::FrameSource(Camera& camera, Clock& clock, const CameraConfig& config, const WorkContext& work,
+                         const TimingLookup& timings)
+    : camera_(camera),
+      clock_(clock),
+      work_(work),
+      info_(camera.configure(config)),
+      measured_(timings ? timings(info_) : std::nullopt),
+      rhythm_(info_, measured_) {
+    if (measured_) info_.readout = Seconds(measured_->readout);
     camera_.start();
 }
 
@@ -64,11 +77,14 @@ FrameSource::~FrameSource() {
     }
 }
 
-void FrameSource::recover() {
+void FrameSource::recover(Nanoseconds patience) {
     if (!failed_) return;
     camera_.stop();
     last_ = {};
+    rhythm_.restart();
+    passed_over_.reset();
     camera_.start();
+    next(clock_.now() + patience);
     failed_ = false;
 }
 
@@ -90,15 +106,21 @@ Frame FrameSource::next(TimePoint deadline) {
 
 void FrameSource::check_order(const Frame& frame, const Place& before) const {
     if (before.sequence && frame.sequence <= *before.sequence)
-        throw DeviceError(
+        throw DamagedFrame(
             fmt::format("frame {} came after frame {}: repeated or out of order", frame.sequence, *before.sequence),
             damaged_hint);
     if (before.timestamp && frame.timestamp <= *before.timestamp)
-        throw DeviceError(fmt::format("frame {} carries a timestamp no later than the frame before it", frame.sequence),
-                          "the camera's timestamps run backwards; update its driver");
-    if (frame.exposure.end < frame.exposure.begin || frame.exposure.end > clock_.now())
-        throw DeviceError(fmt::format("frame {} claims to be exposed in the future", frame.sequence),
-                          "the camera's timestamps come from another clock; update its driver");
+        throw DamagedFrame(
+            fmt::format("frame {} carries a timestamp no later than the frame before it", frame.sequence),
+            "the camera's timestamps run backwards; update its driver");
+}
+
+void FrameSource::check_present(const Frame& frame) const {
+    const TimePoint now = clock_.now();
+    if (frame.exposure.end < frame.exposure.begin || frame.timestamp > now ||
+        frame.exposure.end > now + rhythm_.period() / late_stamps)
+        throw DamagedFrame(fmt::format("frame {} claims to be exposed in the future", frame.sequence),
+                           "the camera's timestamps come from another clock; update its driver");
 }
 
 std::uint64_t FrameSource::lost_while_waiting(const Frame& frame, const Place& before, TimePoint begin) const {
@@ -108,21 +130,107 @@ std::uint64_t FrameSource::lost_while_waiting(const Frame& frame, const Place& b
     return std::min(frame.sequence - *before.sequence - 1, static_cast<std::uint64_t>(std::max(frames, 0.0)));
 }
 
+FrameSource::Place FrameSource::take_in(Frame& frame) {
+    const Place before = std::exchange(last_, Place{frame.sequence, frame.timestamp});
+    in_rhythm_ = rhythm_.follow(frame);
+    frame.exposure = rhythm_.locked() && in_rhythm_ ? rhythm_.predicted(frame.sequence) : rhythm_.exposure_of(frame);
+    note_picture(frame);
+    return before;
+}
+
+/// Whether the frame holds next to no light: sensors without noise give one dark frame like another.
+bool FrameSource::is_dark(const Frame& frame) const {
+    constexpr std::size_t step = 32;  // bytes
+    constexpr double least_share = 0.002;
+    double sum = 0, count = 0;
+    const bool wide = bytes_per_sample(frame.format) == 2;
+    for (std::size_t i = 0; i + 1 < frame.pixels.size(); i += step, ++count)
+        sum += std::to_integer<int>(frame.pixels[i]) + (wide ? 256 * std::to_integer<int>(frame.pixels[i + 1]) : 0);
+    return count == 0 || sum / count - frame.black_level < least_share * std::exp2(frame.bit_depth);
+}
+
+/// Eight bytes at a time; hashes are compared within one run only.
+void FrameSource::note_picture(const Frame& frame) {
+    repeated_.reset();
+    if (is_dark(frame)) return;
+    std::uint64_t hash = frame.pixels.size();
+    std::uint64_t word = 0;
+    for (std::size_t i = 0; i < frame.pixels.size(); i += sizeof word) {
+        std::memcpy(&word, frame.pixels.data() + i, std::min(sizeof word, frame.pixels.size() - i));
+        hash = (hash ^ word) * 0x9e3779b97f4a7c15U;
+        hash ^= hash >> 29U;
+    }
+    for (const auto& [sequence, earlier] : pictures_)
+        if (earlier == hash) repeated_ = sequence;
+    if (repeated_) ++repeats_;
+    pictures_.emplace_back(frame.sequence, hash);
+    if (pictures_.size() > pictures_kept) pictures_.pop_front();
+}
+
 Frame FrameSource::first_after(TimePoint earliest, TimePoint deadline) {
     const TimePoint begin = clock_.now();
+    passed_over_.reset();
     while (true) {
         Frame frame = next(deadline);
-        const Place before = std::exchange(last_, Place{frame.sequence, frame.timestamp});
+        const Place before = take_in(frame);
         lost_ += lost_while_waiting(frame, before, begin);
-        if (frame.exposure.begin >= earliest) {
-            check_order(frame, before);
+        const Nanoseconds margin = rhythm_.locked() ? rhythm_.margin() : Nanoseconds(0);
+        if (frame.exposure.begin >= earliest + margin) check_order(frame, before);
+        if (in_rhythm_ && frame.exposure.begin >= earliest + margin) {
+            check_present(frame);
             check_frame(frame, info_);
+            if (passed_over_ && passed_over_->sequence + 1 != frame.sequence) passed_over_.reset();
             return frame;
         }
         if (clock_.now() >= deadline)
             throw DeadlineError("no frame began after the lamp was steady",
                                 "raise frame_deadline_s of [capture], or check the camera's timestamps");
+        passed_over_ = std::move(frame);
     }
+}
+
+std::optional<Frame> FrameSource::take_passed_over() {
+    std::optional<Frame> frame = std::exchange(passed_over_, std::nullopt);
+    if (!frame) return std::nullopt;
+    try {
+        check_frame(*frame, info_);
+    } catch (const DeviceError&) {
+        return std::nullopt;
+    }
+    return frame;
+}
+
+std::optional<Frame> FrameSource::next_until(TimePoint moment) {
+    const TimePoint begin = clock_.now();
+    std::optional<Frame> frame;
+    while (!frame) {
+        stop_when_asked(work_);
+        try {
+            frame = camera_.next_frame(std::min(moment, clock_.now() + slice));
+        } catch (const DeadlineError&) {
+            if (clock_.now() >= moment) return std::nullopt;
+        } catch (const DeviceError&) {
+            failed_ = true;
+            throw;
+        }
+    }
+    const Place before = take_in(*frame);
+    lost_ += lost_while_waiting(*frame, before, begin);
+    check_order(*frame, before);
+    if (in_rhythm_) check_present(*frame);
+    check_frame(*frame, info_);
+    return frame;
+}
+
+bool FrameSource::find_rhythm(TimePoint deadline) {
+    while (!rhythm_.locked() || !in_rhythm_) {
+        if (clock_.now() >= deadline) return false;
+        try {
+            next_until(deadline);
+        } catch (const DamagedFrame&) {  // NOLINT(bugprone-empty-catch): the next may be good
+        }
+    }
+    return true;
 }
 
 }  // namespace darkbox

@@ -24,6 +24,11 @@ constexpr Allowance same_picture{0.05, 0.5};
 /// Within one lamp a little vibration does no harm; a share of another lamp reaches tens to thousands.
 constexpr Allowance steady{1.0, 5.0};
 
+/// Another lamp's light in a band of rows, beyond what noise explains.
+constexpr double foreign_light = 0.002;
+
+constexpr const char* unsteady_hint = "raise settle_ms of the lamp, look for flicker of its supply and for vibration";
+
 /// A dark frame that a stuck lamp brightens looks like that lamp's picture.
 constexpr double looks_alike = 0.9;
 
@@ -74,21 +79,35 @@ std::string PictureCheck::accept_dark(const Frame& frame) {
                        above_black, change);
 }
 
-std::string PictureCheck::accept_lit(const std::string& lamp, const Frame& frame, const Frame& confirming) {
+std::string PictureCheck::accept_lit(const std::string& lamp, const Frame& frame, const Frame* confirming) {
     Picture picture = to_picture(frame);
     const double signal = share(mean(picture) - mean(*dark_));
     check_signal(signal);
     check_not_repeated(frame, confirming);
-    const NoiseModel noise = check_steady(picture, to_picture(confirming));
+    const NoiseModel noise = confirming ? check_steady(lamp, picture, to_picture(*confirming)) : noise_.value();
     const std::string unlike = check_not_another_lamp(lamp, picture, noise);
 
     noise_ = noise;
-    for (const Frame* taken : {&frame, &confirming}) seen_.emplace(hash_of(taken->pixels), lamp);
+    for (const Frame* taken : {&frame, confirming})
+        if (taken) seen_.emplace(hash_of(taken->pixels), lamp);
     shrunken_.push_back({lamp, shrink(picture)});
     std::erase_if(recent_, [&](const LitPicture& lit) { return lit.lamp == lamp; });
     recent_.push_back({lamp, std::move(picture)});
     if (recent_.size() > recent_lamps) recent_.pop_front();
     return fmt::format("mean {:.4f} of full scale above the dark frame{}", signal, unlike);
+}
+
+std::optional<WitnessReport> PictureCheck::hear(const std::optional<std::string>& before, const Frame& spoiled,
+                                                const Frame* after, const ExpectedShares& expected,
+                                                const WitnessTolerance& tolerance) const {
+    if (!noise_) return std::nullopt;
+    const auto lit =
+        std::find_if(recent_.begin(), recent_.end(), [&](const LitPicture& p) { return p.lamp == before; });
+    if (before && lit == recent_.end()) return std::nullopt;
+    const Picture picture_spoiled = to_picture(spoiled);
+    const Picture picture_after = after ? to_picture(*after) : Picture();
+    return hear_witness({&*dark_, before ? &lit->picture : nullptr, &picture_spoiled, after ? &picture_after : nullptr},
+                        *noise_, full_scale_, expected, tolerance);
 }
 
 void PictureCheck::check_signal(double signal) const {
@@ -99,22 +118,41 @@ void PictureCheck::check_signal(double signal) const {
                      "check the lamp, its supply and its wiring; for a dim lamp raise exposure_ms of [camera]");
 }
 
-void PictureCheck::check_not_repeated(const Frame& frame, const Frame& confirming) const {
+void PictureCheck::check_not_repeated(const Frame& frame, const Frame* confirming) const {
     constexpr const char* hint = "the camera or its driver delivers a picture twice; plug it in again or update it";
     const auto earlier = seen_.find(hash_of(frame.pixels));
     if (earlier != seen_.end())
         throw InputError(fmt::format("the frame repeats the frame of lamp '{}' bit for bit", earlier->second), hint);
-    if (frame.pixels == confirming.pixels) throw InputError("two exposures in a row are the same bit for bit", hint);
+    if (confirming && frame.pixels == confirming->pixels)
+        throw InputError("two exposures in a row are the same bit for bit", hint);
 }
 
-NoiseModel PictureCheck::check_steady(const Picture& first, const Picture& second) const {
+NoiseModel PictureCheck::check_steady(const std::string& lamp, const Picture& first, const Picture& second) const {
     const NoiseModel noise = noise_ ? *noise_ : measure_noise(first, second, *dark_, full_scale_);
     const Difference difference = compare(first, second, *dark_, noise);
-    if (same_light(difference, steady)) return noise;
-    throw InputError(fmt::format("two exposures in a row under the lamp differ: {:.3f} times the brightness, {:.1f} "
-                                 "times the noise; the first began before the lamp was alone and steady",
-                                 difference.gain, difference.pixels.value),
-                     "raise settle_ms of the lamp, look for flicker of its supply and for vibration");
+    if (!same_light(difference, steady))
+        throw InputError(
+            fmt::format("two exposures in a row under the lamp differ: {:.3f} times the brightness, {:.1f} "
+                        "times the noise; the first began before the lamp was alone and steady",
+                        difference.gain, difference.pixels.value),
+            unsteady_hint);
+    check_bands(lamp, first, second, noise);
+    return noise;
+}
+
+/// A few rows that were exposed too early hardly show in the whole picture, but in their band.
+void PictureCheck::check_bands(const std::string& lamp, const Picture& first, const Picture& second,
+                               const NoiseModel& noise) const {
+    const auto before =
+        std::find_if(recent_.rbegin(), recent_.rend(), [&](const LitPicture& lit) { return lit.lamp != lamp; });
+    const Picture* earlier = before == recent_.rend() ? nullptr : &before->picture;
+    const BandLights lights = compare_bands({&*dark_, earlier, &first, &second}, noise, full_scale_);
+    if (lights.most_before > foreign_light || lights.most_missing > flicker)
+        throw InputError(
+            fmt::format("some rows of the first of two exposures hold {:.1f} % of another lamp's light and lack {:.1f} "
+                        "% of their own; it began before the lamp was alone and steady",
+                        100 * lights.most_before, 100 * lights.most_missing),
+            unsteady_hint);
 }
 
 std::string PictureCheck::check_not_another_lamp(const std::string& lamp, const Picture& picture,

@@ -10,6 +10,7 @@
 #include "acquisition/camera/camera.h"
 #include "acquisition/frame/error.h"
 #include "rig/capture/picture.h"
+#include "rig/capture/switch_witness.h"
 #include "rig/description/rig_description.h"
 
 namespace darkbox {
@@ -30,10 +31,21 @@ public:
     bool has_dark() const { return dark_.has_value(); }
     /// No brighter than the black level allows, and, but for the first, as dark as the first.
     std::string accept_dark(const Frame& frame);
-    /// Two exposures in a row under one lamp; the first is the one to keep. It is brighter than the dark frame, shows
-    /// the light of the second (it did not begin before the lamp was alone and steady), and is neither the same bits as
-    /// an earlier frame nor the same picture as another lamp's. The first call also learns what the noise comes to.
-    std::string accept_lit(const std::string& lamp, const Frame& frame, const Frame& confirming);
+    /// A frame lit by the lamp, and, unless a witness was heard, the exposure after it under the same lamp. The frame
+    /// is brighter than the dark frame, shows the light of the confirming one (it did not begin before the lamp was
+    /// alone and steady), and is neither the same bits as an earlier frame nor the same picture as another lamp's. The
+    /// first call needs a confirming exposure: it learns what the noise comes to.
+    std::string accept_lit(const std::string& lamp, const Frame& frame, const Frame* confirming = nullptr);
+
+    /// Two exposures of one light have told what the noise comes to.
+    bool knows_noise() const { return noise_.has_value(); }
+
+    /// What the frame tells that the switch spoiled; see switch_witness.h. `before`: the lamp of before, none for
+    /// darkness; `after`: the frame after the switch, null where it was to darkness. No value when the noise or the
+    /// picture of before is not known.
+    std::optional<WitnessReport> hear(const std::optional<std::string>& before, const Frame& spoiled,
+                                      const Frame* after, const ExpectedShares& expected,
+                                      const WitnessTolerance& tolerance) const;
 
 private:
     struct LitPicture {
@@ -43,8 +55,10 @@ private:
 
     double share(double difference) const { return difference / (full_scale_ - black_level_); }
     void check_signal(double signal) const;
-    void check_not_repeated(const Frame& frame, const Frame& confirming) const;
-    NoiseModel check_steady(const Picture& first, const Picture& second) const;
+    void check_not_repeated(const Frame& frame, const Frame* confirming) const;
+    NoiseModel check_steady(const std::string& lamp, const Picture& first, const Picture& second) const;
+    void check_bands(const std::string& lamp, const Picture& first, const Picture& second,
+                     const NoiseModel& noise) const;
     std::string check_not_another_lamp(const std::string& lamp, const Picture& picture, const NoiseModel& noise) const;
     std::string likely_stuck_lamp(const Picture& dark) const;
 

@@ -24,6 +24,7 @@ struct Arguments {
     int simulate = 0;  ///< lamps of the built-in simulated rig; 0 = not asked for
     std::string object;
     std::string plan = "all";
+    std::string mode;  ///< empty: the rig's own
     fs::path resume;
     fs::path out;
     fs::path socket;
@@ -52,7 +53,8 @@ RigDescription rig_for(const Arguments& a, const CaptureRequest& request) {
 }
 
 CaptureRequest request_for(const Arguments& a) {
-    CaptureRequest request{.folder = a.out, .object = a.object, .lamps = lamps_of_plan(a.plan)};
+    CaptureRequest request{
+        .folder = a.out, .object = a.object, .lamps = lamps_of_plan(a.plan), .mode = sync_mode_from_name(a.mode)};
     const fs::path folder = default_sessions_folder();
     if (!a.resume.empty()) {
         request.start = CaptureStart::resume;
@@ -142,7 +144,7 @@ private:
 };
 
 CaptureOrder order_for(const Arguments& a, const DaemonClient& client) {
-    CaptureOrder order{.object = a.object, .lamps = lamps_of_plan(a.plan)};
+    CaptureOrder order{.object = a.object, .lamps = lamps_of_plan(a.plan), .mode = sync_mode_from_name(a.mode)};
     if (a.out.empty() && a.resume.empty()) return order;
     const std::string folder = client.call("GET", "status").at("sessions");
     if (!a.resume.empty()) order.resume = name_in_folder(a.resume, folder);
@@ -248,6 +250,9 @@ void add_capture_command(CommandLine& line) {
         ->excludes(rig);
     command.add_option("--object", a->object, "Name of the object");
     command.add_option("--plan", a->plan, "all, names of lamps between commas, or recalibrate");
+    command
+        .add_option("--mode", a->mode, "How fast: settled, predictive or strobed; default: the rig's [capture] mode")
+        ->check(CLI::IsMember({"settled", "predictive", "strobed"}));
     command.add_option("--resume", a->resume, "Go on with this interrupted session");
     command.add_option("--out", a->out, "The new session; default: made of object and date");
     command.add_flag("--standalone", a->standalone, "Drive the rig in this process, without darkboxd");

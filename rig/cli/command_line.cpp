@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdio>
 
 #include "acquisition/frame/error.h"
+#include "rig/cli/arguments.h"
 #include "rig/cli/interrupt.h"
 #include "rig/cli/progress_bar.h"
 
@@ -15,6 +17,23 @@ namespace {
 
 /// Unlike fmt::print, which throws when stderr is closed: there would be nobody left to tell.
 void put(const std::string& text) { std::fputs(text.c_str(), stderr); }
+
+/// A reader that has read enough and left (`darkbox ... | head`) is no failure.
+void put_out(const std::string& text) {
+    if (std::fputs(text.c_str(), stdout) >= 0 && std::fflush(stdout) == 0) return;
+    if (errno != EPIPE) throw Error("the result could not be written to stdout", "is the disk full?");
+}
+
+/// Long names of the options on the command line, without their dashes.
+std::vector<std::string> given_options(const CLI::App& app) {
+    std::vector<std::string> given;
+    for (const CLI::Option* option : app.get_options())
+        if (option->count() > 0)
+            for (const std::string& name : option->get_lnames()) given.push_back(name);
+    for (const CLI::App* command : app.get_subcommands())
+        for (std::string& name : given_options(*command)) given.push_back(std::move(name));
+    return given;
+}
 
 void print_error(const std::string& what, const std::string& hint) {
     const bool colour = ::isatty(STDERR_FILENO) != 0;
@@ -68,6 +87,8 @@ CLI::App& CommandLine::add_group(const std::string& name, const std::string& des
 int CommandLine::run(int argc, char** argv) {
     try {
         return parse_and_run(argc, argv);
+    } catch (const UsageError& error) {
+        return fail(error.what(), error.hint(), exit_usage);
     } catch (const Error& error) {
         return fail(error.what(), error.hint());
     } catch (const std::bad_alloc&) {
@@ -77,10 +98,21 @@ int CommandLine::run(int argc, char** argv) {
     }
 }
 
-int CommandLine::fail(const std::string& what, const std::string& hint) const {
+int CommandLine::fail(const std::string& what, const std::string& hint, ExitStatus status) const {
     print_error(what, hint);
     if (json_) std::fputs((printed({{"error", what}, {"hint", hint}}) + "\n").c_str(), stdout);
-    return exit_failed;
+    return status;
+}
+
+/// Options are checked by the stages, which call them by their fields' names.
+CommandResult CommandLine::run_chosen(const WorkContext& work) const {
+    try {
+        return (*chosen_)(work);
+    } catch (const UsageError&) {
+        throw;
+    } catch (const InputError& error) {
+        throw InputError(in_options(error.what(), given_options(app_)), error.hint());
+    }
 }
 
 int CommandLine::parse_and_run(int argc, char** argv) {
@@ -97,17 +129,16 @@ int CommandLine::parse_and_run(int argc, char** argv) {
     work.stop = interrupt.token();
     work.threads = threads_;
 
-    const CommandResult result = (*chosen_)(work);
+    const CommandResult result = run_chosen(work);
     bar.finish();
     for (const std::string& warning : result.warnings) print_warning(warning);
     if (json_) {
         Json json = result.json;
         if (!json.contains("warnings")) json["warnings"] = result.warnings;
-        fmt::print("{}\n", printed(json));
+        put_out(printed(json) + "\n");
     } else if (!result.text.empty()) {
-        fmt::print("{}\n", result.text);
+        put_out(result.text + "\n");
     }
-    if (std::fflush(stdout) != 0) throw Error("the result could not be written to stdout", "is the disk full?");
     return strict_ && !result.warnings.empty() ? exit_warnings : exit_done;
 }
 

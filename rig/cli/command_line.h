@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "acquisition/frame/error.h"
 #include "acquisition/frame/progress.h"
 
 namespace darkbox {
@@ -22,6 +23,12 @@ struct CommandResult {
 
 /// Exit statuses, the same for every command.
 enum ExitStatus { exit_done = 0, exit_failed = 1, exit_usage = 2, exit_warnings = 3 };
+
+/// The command line itself is at fault, whatever the files hold: exit_usage.
+class UsageError : public InputError {
+public:
+    using InputError::InputError;
+};
 
 /// The `darkbox` command line: subcommands register themselves here, run() parses, runs the chosen one, and is the one
 /// place that catches. Thread-compatible.
@@ -42,7 +49,8 @@ public:
 
 private:
     int parse_and_run(int argc, char** argv);
-    int fail(const std::string& what, const std::string& hint) const;
+    CommandResult run_chosen(const WorkContext& work) const;
+    int fail(const std::string& what, const std::string& hint, ExitStatus status = exit_failed) const;
 
     CLI::App app_;
     std::optional<Body> chosen_;

@@ -3,8 +3,10 @@
 #include <map>
 #include <memory>
 
+#include "acquisition/frame/error.h"
 #include "processing/normals/solver_names.h"
 #include "processing/pipeline/evaluate.h"
+#include "rig/cli/choices.h"
 #include "rig/cli/commands.h"
 
 namespace darkbox {
@@ -82,6 +84,13 @@ Json to_json(const HeldOutLight& light, const std::vector<std::string>& predicto
     return json;
 }
 
+Json to_json(const MeanErrors& means) {
+    Json json = to_json(means.errors);
+    for (std::size_t kind = 0; kind < pixel_kinds.size(); ++kind)
+        if (means.errors[kind]) json[name(pixel_kinds[kind])]["photographs"] = means.photographs[kind];
+    return json;
+}
+
 Json means_json(const Evaluation& evaluation) {
     Json json = Json::object();
     for (std::size_t p = 0; p < evaluation.predictors.size(); ++p)
@@ -154,8 +163,10 @@ std::string held_out_table(const Evaluation& evaluation, std::size_t predictor) 
                             cells(light.errors[predictor]), light.normal_change_deg);
     }
     for (const auto& [group, label] : groups) {
-        const PredictionErrors means = mean_errors(evaluation.held_out, predictor, group);
-        if (means.front()) text += fmt::format("{:{}}  {:8}{}\n", "mean", width, label, cells(means));
+        const MeanErrors means = mean_errors(evaluation.held_out, predictor, group);
+        if (means.errors.front())
+            text += fmt::format("{:{}}  {:8}{}  of {} photographs\n", "mean", width, label, cells(means.errors),
+                                means.photographs.front());
     }
     return text;
 }
@@ -191,6 +202,9 @@ CommandResult evaluate(const Arguments& arguments, const WorkContext& work) {
     const Session session = Session::open(arguments.session);
     session.verify();
     const Evaluation evaluation = evaluate_session(session, options, work);
+    if (!evaluation.normals && !evaluation.comparison && !evaluation.lights && evaluation.held_out.empty())
+        throw InputError("there is nothing to evaluate: no truth came with the photographs",
+                         "leave --no-held-out out, or give --lights FILE or --ideal-sphere");
     return {to_json(evaluation, options), describe(evaluation, options), evaluation.warnings};
 }
 
@@ -203,18 +217,13 @@ void add_evaluate_command(CommandLine& line) {
                  "darkbox evaluate s --solver lsq", [a](const WorkContext& work) { return evaluate(*a, work); });
     command.add_option("session", a->session, "The session's folder")->required();
     std::map<std::string, Solver> solvers;
-    std::string choices;
-    for (const auto& [solver, text] : solver_names) {
-        solvers.emplace(text, solver);
-        choices += fmt::format("{}{}", choices.empty() ? "{" : ",", text);
-    }
-    choices += "}";
+    for (const auto& [solver, text] : solver_names) solvers.emplace(text, solver);
     command.add_option("--solver", a->options.solver, "Solve again with this (else as the results were made)")
-        ->transform(CLI::CheckedTransformer(solvers).description(choices));
+        ->transform(one_of(solvers));
     command
         .add_option("--compare-solvers", a->options.compare, "Two solvers, compared against the truth pixel by pixel")
         ->expected(2)
-        ->transform(CLI::CheckedTransformer(solvers).description(choices));
+        ->transform(one_of(solvers));
     command.add_option("--drop", a->options.drop, "Frames to leave out of everything");
     command.add_flag("--ideal-sphere", a->ideal_sphere, "The object is a ball: the sphere in its mask is the truth");
     command.add_option("--block", a->options.bootstrap.block_px, "Side of the blocks that --compare-solvers draws, px")

@@ -4,6 +4,7 @@
 
 #include "processing/pipeline/import.h"
 #include "rig/cli/arguments.h"
+#include "rig/cli/choices.h"
 #include "rig/cli/commands.h"
 
 namespace darkbox {
@@ -60,11 +61,11 @@ void add_import_command(CommandLine& line) {
     const std::map<std::string, ImportTransfer> transfers{
         {"auto", ImportTransfer::automatic}, {"linear", ImportTransfer::linear}, {"srgb", ImportTransfer::srgb}};
     command.add_option("--transfer", a->options.transfer, "Transfer curve: auto, linear, srgb")
-        ->transform(CLI::CheckedTransformer(transfers).description("{auto,linear,srgb}"));
+        ->transform(one_of(transfers));
     const std::map<std::string, ImportLayout> layouts{
         {"auto", ImportLayout::automatic}, {"plain", ImportLayout::plain}, {"diligent", ImportLayout::diligent}};
     command.add_option("--format", a->options.layout, "Layout of the folders: auto, plain, diligent")
-        ->transform(CLI::CheckedTransformer(layouts).description("{auto,plain,diligent}"));
+        ->transform(one_of(layouts));
 }
 
 }  // namespace darkbox

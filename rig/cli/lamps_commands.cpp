@@ -11,6 +11,7 @@
 #include "rig/cli/rig_commands.h"
 #include "rig/daemon/client.h"
 #include "rig/daemon/hardware.h"
+#include "rig/lamps/usb_bus.h"
 
 namespace darkbox {
 namespace {
@@ -22,6 +23,7 @@ struct Arguments {
     fs::path socket;
     std::string lamp;
     std::optional<double> seconds;
+    bool boards = false;
 };
 
 /// The darkboxd that runs, if one does: the lamps are its own then.
@@ -46,7 +48,21 @@ Json lamps_of(const RigDescription& rig) {
     return {{"driver", rig.lamps_driver}, {"lamps", list}};
 }
 
+/// The USB lamp controllers that are plugged in, whoever uses them.
+CommandResult list_boards() {
+    CommandResult result;
+    result.json = {{"boards", Json::array()}};
+    for (const UsbBoardInfo& board : UsbBus().boards()) {
+        result.json["boards"].push_back({{"serial", board.serial}, {"place", board.place}, {"problem", board.problem}});
+        result.text +=
+            fmt::format("{}{:<12} {} {}", result.text.empty() ? "" : "\n", board.serial, board.place, board.problem);
+    }
+    if (result.text.empty()) result.text = "no USB lamp controller is plugged in";
+    return result;
+}
+
 CommandResult list(const Arguments& a) {
+    if (a.boards) return list_boards();
     CommandResult result;
     const auto daemon = a.rig.empty() ? running_daemon(a) : std::nullopt;
     result.json = daemon ? Json::parse(daemon->call("GET", "lamps").dump()) : lamps_of(rig_of(a));
@@ -137,8 +153,10 @@ void add_lamps_commands(CommandLine& line) {
         command.add_option("--rig", a->rig, "The rig's description, where no darkboxd runs");
         return std::pair<CLI::App*, std::shared_ptr<Arguments>>(&command, a);
     };
-    add("list", "Names and places of the lamps", "darkbox lamps list",
-        [](const Arguments& a, const WorkContext&) { return list(a); });
+    const auto [lister, listed] = add("list", "Names and places of the lamps", "darkbox lamps list",
+                                      [](const Arguments& a, const WorkContext&) { return list(a); });
+    lister->add_flag("--boards", listed->boards, "The USB lamp controllers that are plugged in, instead");
+    add_lamps_flash_command(line, group);
     add("dark", "Darken every lamp; a running capture is cancelled", "darkbox lamps dark", dark);
     const auto [command, a] =
         add("on", "Light one lamp for a moment, without darkboxd", "darkbox lamps on low-1 --rig rig.toml", on);

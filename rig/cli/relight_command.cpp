@@ -10,6 +10,7 @@
 #include "processing/pipeline/stages.h"
 #include "processing/pipeline/steps.h"
 #include "rig/cli/arguments.h"
+#include "rig/cli/choices.h"
 #include "rig/cli/commands.h"
 #include "rig/cli/relight_options.h"
 #include "rig/cli/relit_files.h"
@@ -41,13 +42,14 @@ std::size_t count_pictures(const Arguments& a) {
 
 void require_one_kind_of_light(const Arguments& a) {
     const bool circle = a.sequence == Sequence::circle, turn = a.sequence == Sequence::turn;
-    const std::size_t kinds = std::size_t{!a.relight.lights.empty()} + a.relight.environments.size() +
-                              std::size_t{circle} + std::size_t{a.constant_r > 0};
+    const std::size_t kinds = std::size_t{!a.relight.lights.empty() || !a.relight.lamp_positions.empty()} +
+                              a.relight.environments.size() + std::size_t{circle} + std::size_t{a.constant_r > 0};
     if (kinds != 1)
-        throw InputError("relight needs one kind of light: lights, an environment, a circling light or a constant r",
-                         "give --light X,Y,Z (once or more), --environment FILE, --sequence circle or --constant-r N");
+        throw UsageError("relight needs one kind of light: lights, an environment, a circling light or a constant r",
+                         "give --light X,Y,Z or --light-position X,Y,Z (once or more), --environment FILE, --sequence "
+                         "circle or --constant-r N");
     if (turn && a.relight.environments.empty())
-        throw InputError("--sequence turn turns an environment, and there is none", "give --environment FILE");
+        throw UsageError("--sequence turn turns an environment, and there is none", "give --environment FILE");
 }
 
 /// `turn` 0...1 of the circle: from the viewer's right by way of above. At 90 degrees the light is at the camera.
@@ -62,9 +64,12 @@ Light light_on_circle(double turn, double elevation_deg) {
 class LightingPlan {
 public:
     LightingPlan(const Arguments& a, const RelightOptions& options) : arguments_(a), options_(options) {
-        for (const std::string& text : a.relight.lights) lights_.push_back(parse_light(text));
+        require_readable_lights(a.relight);
         if (!a.relight.environments.empty()) environment_ = read_environment(a.relight.environments.front());
     }
+
+    /// Before the first picture.
+    void place_lights(const RelightScene& scene) { lights_ = lights_of(arguments_.relight, scene); }
 
     Lighting at(std::size_t picture, const Relighter& relighter, const WorkContext& work) const {
         const double count = static_cast<double>(count_pictures(arguments_)), i = static_cast<double>(picture);
@@ -110,9 +115,12 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
     require_one_kind_of_light(a);
     const RelightOptions options = relight_options(a.relight);
     const std::vector<std::filesystem::path> names = picture_names(a.out, count_pictures(a));
-    const LightingPlan plan(a, options);
+    LightingPlan plan(a, options);
 
-    const RelightScene scene = load_shaded_scene(Session::open(a.session));
+    const Session session = Session::open(a.session);
+    RelightScene scene = load_shaded_scene(session);
+    if (!a.relight.lamp_positions.empty()) scene.geometry = load_geometry(session);
+    plan.place_lights(scene);
     const PictureStyle style{viewing_gain(scene.albedo.albedo, scene.albedo.valid), a.bits};
     const Relighter relighter(scene, work);
     const Seconds seconds = write_pictures(names, plan, relighter, options, style, work);
@@ -140,6 +148,7 @@ void add_relight_command(CommandLine& line) {
     CLI::App& command =
         line.add("relight", "Show the object under other lights or an environment, in one picture or many",
                  "darkbox relight s --light=-0.5,0.5,0.7 --light 1,0,1:0.2,0.3,0.6 --model phong --out relit.png\n  "
+                 "darkbox relight s --light-position=-80,40,200 --out near.png\n  "
                  "darkbox relight s --environment sky.hdr --out under-sky.exr\n  "
                  "darkbox relight s --sequence circle --frames 100 --elevation 30 --out frames/%04d.png\n  "
                  "ffmpeg -framerate 25 -i frames/%04d.png -pix_fmt yuv420p circle.mp4",
@@ -154,7 +163,7 @@ void add_relight_command(CommandLine& line) {
     command
         .add_option("--sequence", a->sequence,
                     "circle: a light goes round the object; turn: the environment turns about the upright axis")
-        ->transform(CLI::CheckedTransformer(sequences).description("{circle,turn}"));
+        ->transform(one_of(sequences));
     command.add_option("--frames", a->frames, "Pictures of a whole sequence")
         ->check(CLI::Range(1, 100000))
         ->capture_default_str();

@@ -2,12 +2,20 @@
 
 #include <numbers>
 
+#include "processing/pipeline/session_geometry.h"
 #include "rig/cli/arguments.h"
+#include "rig/cli/choices.h"
 
 namespace darkbox {
 
 void add_relight_options(CLI::App& command, RelightArguments& a) {
     command.add_option("--light", a.lights, "Vector to a light, viewer frame: X,Y,Z or X,Y,Z:R,G,B; may be repeated")
+        ->expected(1)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    command
+        .add_option("--light-position", a.lamp_positions,
+                    "Place of a near lamp, mm in the viewer frame: X,Y,Z or X,Y,Z:R,G,B as it arrives at the object; "
+                    "may be repeated")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     command.add_option("--environment", a.environments, "Light probe, equirectangular .hdr or .exr")
@@ -21,21 +29,36 @@ void add_relight_options(CLI::App& command, RelightArguments& a) {
     command
         .add_option("--model", a.options.model,
                     "lambert; phong: one coefficient, highlights of the texel's colour; phong-split: a coat of gloss")
-        ->transform(CLI::CheckedTransformer(models).description("{lambert,phong,phong-split}"));
+        ->transform(one_of(models));
     const std::map<std::string, Lookup> lookups{{"thesis", Lookup::thesis}, {"detail", Lookup::detail}};
     command
         .add_option("--lookup", a.options.lookup, "thesis: the texel's radiance; detail: scaled by the pixel's albedo")
-        ->transform(CLI::CheckedTransformer(lookups).description("{thesis,detail}"));
+        ->transform(one_of(lookups));
     const std::map<std::string, OutOfRange> beyond{{"clamp", OutOfRange::clamp}, {"scale", OutOfRange::scale}};
     command
         .add_option("--out-of-range", a.options.out_of_range,
                     "Coefficients above 1 (k_d + k_s > 1): clamp to the brightest level, or scale it")
-        ->transform(CLI::CheckedTransformer(beyond).description("{clamp,scale}"));
+        ->transform(one_of(beyond));
     command.add_option("--diffuse", a.options.phong_diffuse, "Phong's k_d, 0 to 1")->capture_default_str();
     command.add_option("--specular", a.options.phong_specular, "Phong's k_s, 0 to 1")->capture_default_str();
     command.add_option("--exponent", a.options.phong_exponent, "Phong's exponent, 1 to 1000")->capture_default_str();
     command.add_option("--specular-colour", a.specular_colour, "Colour of phong-split's highlights: R,G,B, 0 to 1");
     command.add_option("--exposure", a.options.exposure, "Factor on the result")->capture_default_str();
+}
+
+void require_readable_lights(const RelightArguments& arguments) {
+    for (const std::string& light : arguments.lights) parse_light(light);
+    for (const std::string& place : arguments.lamp_positions) parse_lamp_position(place, Eigen::Vector3d::Zero());
+}
+
+Lights lights_of(const RelightArguments& arguments, const RelightScene& scene) {
+    Lights lights;
+    for (const std::string& light : arguments.lights) lights.push_back(parse_light(light));
+    if (arguments.lamp_positions.empty()) return lights;
+    const Eigen::Vector3d object =
+        scene.geometry.view->point_at(centroid_of(scene.normals.valid).value_or(cv::Point2d(0, 0)));
+    for (const std::string& place : arguments.lamp_positions) lights.push_back(parse_lamp_position(place, object));
+    return lights;
 }
 
 RelightOptions relight_options(const RelightArguments& arguments) {

@@ -9,6 +9,7 @@
 #include "acquisition/frame/error.h"
 #include "processing/formats/atomic_file.h"
 #include "processing/formats/exr.h"
+#include "processing/formats/jpeg_writer.h"
 #include "processing/formats/png.h"
 #include "processing/maps/srgb.h"
 #include "processing/pipeline/steps.h"
@@ -101,6 +102,14 @@ double render_to_file(const Relighter& relighter, const Lighting& lighting, cons
     else
         write_png(path, viewable_16(floats, style.gain));
     return seconds;
+}
+
+double gain_under(const FoldedEnvironment& environment, const Relighter& relighter, RelightOptions options,
+                  const cv::Mat1b& object, const WorkContext& work) {
+    options.exposure = 1;
+    cv::Mat3f picture(relighter.size());
+    relighter.render(environment, options, picture, work);
+    return viewing_gain(picture, object);
 }
 
 }  // namespace darkbox

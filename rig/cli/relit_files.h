@@ -31,4 +31,9 @@ std::vector<std::filesystem::path> picture_names(const std::filesystem::path& ou
 double render_to_file(const Relighter& relighter, const Lighting& lighting, const RelightOptions& options,
                       const PictureStyle& style, const std::filesystem::path& path, const WorkContext& work);
 
+/// The gain under which what the environment lights inside `object` just fills the range that can be seen: probes come
+/// in any unit. The options' exposure counts on top of it.
+double gain_under(const FoldedEnvironment& environment, const Relighter& relighter, RelightOptions options,
+                  const cv::Mat1b& object, const WorkContext& work);
+
 }  // namespace darkbox

@@ -103,6 +103,7 @@ void add_rig_commands(CommandLine& line) {
     check.add_option("--rig", check_arguments->rig, "The rig's description")->required();
     check.add_flag("--camera", check_arguments->camera, "Set up the camera, too, and tell what is in effect");
 
+    add_measure_latency_command(line, rig);
     add_rig_plan_command(line, rig);
 
     add_lamps_commands(line);

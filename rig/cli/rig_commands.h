@@ -25,6 +25,12 @@ void add_ageing_command(CommandLine& line);
 /// `darkbox lamps`.
 void add_lamps_commands(CommandLine& line);
 
+/// `darkbox lamps flash`, into the group `lamps`.
+void add_lamps_flash_command(CommandLine& line, CLI::App& lamps);
+
+/// `darkbox rig measure-latency`, into the group `rig`.
+void add_measure_latency_command(CommandLine& line, CLI::App& rig);
+
 /// `darkbox rig plan`, into the group `rig`.
 void add_rig_plan_command(CommandLine& line, CLI::App& rig);
 

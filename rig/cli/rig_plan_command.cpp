@@ -5,6 +5,7 @@
 #include "acquisition/frame/error.h"
 #include "processing/calibration/rig_plan.h"
 #include "processing/formats/atomic_file.h"
+#include "rig/cli/choices.h"
 #include "rig/cli/rig_commands.h"
 
 namespace darkbox {
@@ -98,7 +99,7 @@ void add_rig_plan_command(CommandLine& line, CLI::App& rig) {
         .add_option("--shadows", options.shadows,
                     "respected: a lamp below a normal's horizon says nothing of it; ignored: for shallow reliefs; "
                     "automatic: ignored for 3 lamps, respected for more")
-        ->transform(CLI::CheckedTransformer(shadows).description("{automatic,respected,ignored}"));
+        ->transform(one_of(shadows));
     command.add_option("--toml", a->toml, "Also write [[lamps.lamp]] sections for a rig.toml to this file");
 }
 

@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "acquisition/frame/error.h"
 #include "processing/pipeline/export.h"
 #include "rig/cli/arguments.h"
 #include "rig/cli/commands.h"
@@ -25,10 +26,19 @@ CommandResult verify(const fs::path& folder) {
     return result;
 }
 
+ExportFormat named_format(const std::string& format) {
+    try {
+        return export_format(format);
+    } catch (const InputError& error) {
+        throw UsageError(error.what(), error.hint());
+    }
+}
+
 CommandResult export_to(const fs::path& folder, const std::string& format, const fs::path& out,
                         const WorkContext& work) {
+    const ExportFormat wanted = named_format(format);
     require_outside_payload(out);
-    export_session(Session::open(folder), export_format(format), out, work);
+    export_session(Session::open(folder), wanted, out, work);
     CommandResult result;
     result.json = {{"format", format}, {"out", out.string()}};
     result.text = fmt::format("{}: written as {}", out.string(), format);
@@ -54,7 +64,7 @@ void add_session_commands(CommandLine& line) {
     CLI::App& command =
         take_session(line.add("export", "Write results for other programs", "darkbox export s --format ply --out s.ply",
                               [a](const WorkContext& work) { return export_to(a->session, a->format, a->out, work); }));
-    command.add_option("--format", a->format, "lp, diligent, ptm, ptm-rgb, relight or ply")->required();
+    command.add_option("--format", a->format, "lp, diligent, ptm, ptm-rgb, relight, relight-rgb or ply")->required();
     command.add_option("--out", a->out, "File or folder to write")->required();
 }
 

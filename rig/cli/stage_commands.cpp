@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <memory>
 
@@ -6,6 +7,7 @@
 #include "processing/pipeline/stages.h"
 #include "processing/pipeline/summary_json.h"
 #include "rig/cli/arguments.h"
+#include "rig/cli/choices.h"
 #include "rig/cli/commands.h"
 
 namespace darkbox {
@@ -35,6 +37,12 @@ ProcessOptions options_of(const Arguments& arguments) {
     return options;
 }
 
+/// Nothing that a person made goes without a word.
+std::string what_went(const std::vector<std::string>& folders, const char* made_with) {
+    if (folders.empty()) return {};
+    return fmt::format("\nremoved, as made with other {}: {}", made_with, fmt::join(folders, ", "));
+}
+
 std::string describe(const CalibrateSummary& summary) {
     const Calibration& c = summary.calibration;
     const auto used = std::count_if(c.lights.begin(), c.lights.end(), [](const Light& light) { return light.used; });
@@ -44,7 +52,7 @@ std::string describe(const CalibrateSummary& summary) {
     if (near > 0) text += fmt::format("\n{} lamps are near: their places are known in mm", near);
     for (const Ball& ball : c.balls)
         text += fmt::format("\nball at ({:.1f}, {:.1f}), radius {:.1f} px", ball.x, ball.y, ball.radius);
-    return text;
+    return text + what_went(summary.removed, "lights");
 }
 
 std::string describe(const NormalsSummary& summary) {
@@ -57,7 +65,7 @@ std::string describe(const NormalsSummary& summary) {
     if (summary.mean_angular_error_deg)
         text += fmt::format("\nmean angular error against the truth that came with the pictures: {:.2f} degrees",
                             *summary.mean_angular_error_deg);
-    return text;
+    return text + what_went(summary.removed, "normals");
 }
 
 std::string describe(const TexelsSummary& summary) {
@@ -106,7 +114,7 @@ void add_calibrate_options(CLI::App& command, Arguments& a) {
     const std::map<std::string, LampModel> models{
         {"auto", LampModel::automatic}, {"distant", LampModel::distant}, {"near", LampModel::near}};
     command.add_option("--lamps", calibration.lamps, "near: lamps have places; distant: directions; auto: as known")
-        ->transform(CLI::CheckedTransformer(models).description("{auto,distant,near}"));
+        ->transform(one_of(models));
     command.add_option("--drop", calibration.drop, "Frames to leave out");
     command.add_option("--highlight", a.highlights, "A highlight read by hand: FRAME=X,Y");
     command.add_option("--grey-card", a.grey_card,
@@ -114,11 +122,14 @@ void add_calibrate_options(CLI::App& command, Arguments& a) {
     command.add_option("--grey-card-mask", a.grey_card_mask, "Picture that is white on the grey card, of any outline");
     command.add_flag("--photometric", a.options.calibrate.photometric,
                      "Refine the lights with the object's own diffuse pixels as well");
-    command.add_option("--from", a.from, "Reuse the lights of this lights.json or session");
+    command.add_option("--from", a.from, "Reuse the lights of this lights.json or session, lamp by lamp");
+    command.add_flag_callback(
+        "--any-rig", [&a] { a.options.calibrate.other_rig = OtherRig::compare; },
+        "With --from: lamps without a common name are matched by their place");
     const std::map<std::string, CalibrationMethod> methods{{"refined", CalibrationMethod::refined},
                                                            {"brightest", CalibrationMethod::brightest}};
     command.add_option("--method", calibration.method, "refined, or brightest: the plain method of the thesis")
-        ->transform(CLI::CheckedTransformer(methods).description("{refined,brightest}"));
+        ->transform(one_of(methods));
 }
 
 void add_normals_options(CLI::App& command, Arguments& a) {
@@ -127,7 +138,7 @@ void add_normals_options(CLI::App& command, Arguments& a) {
     command
         .add_option("--solver", a.options.normals.stereo.solver,
                     "lsq: least squares over all lights; robust: leaves out shadows and highlights")
-        ->transform(CLI::CheckedTransformer(solvers).description("{lsq,robust}"));
+        ->transform(one_of(solvers));
     command
         .add_option("--memory-mib", a.options.normals.stereo.memory_mib,
                     "Memory for photographs and maps while solving")
@@ -141,7 +152,7 @@ void add_normals_options(CLI::App& command, Arguments& a) {
         .add_option("--intensities", a.options.normals.intensities,
                     "given: as calibrated; estimate: with the normals; auto: estimated where nothing is known of them "
                     "and the photographs clearly ask for it")
-        ->transform(CLI::CheckedTransformer(choices).description("{auto,given,estimate}"));
+        ->transform(one_of(choices));
 }
 
 void add_texels_options(CLI::App& command, Arguments& a) {

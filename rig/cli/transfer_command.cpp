@@ -18,6 +18,7 @@
 #include "processing/pipeline/stages.h"
 #include "processing/transfer/transfer.h"
 #include "rig/cli/arguments.h"
+#include "rig/cli/choices.h"
 #include "rig/cli/commands.h"
 #include "rig/cli/relight_options.h"
 #include "rig/cli/relit_files.h"
@@ -55,30 +56,47 @@ struct Source {
 Source load_source(const Arguments& a) {
     const bool plain = !a.source_normals.empty() || !a.source_albedo.empty();
     if (plain == !a.source.empty())
-        throw InputError("transfer needs one source",
+        throw UsageError("transfer needs one source",
                          "give --source SESSION, or --source-normals FILE and --source-albedo FILE");
     if (!plain) {
         RelightScene scene = load_scene(Session::open(a.source));
         return {{std::move(scene.normals), std::move(scene.albedo), std::move(scene.index)}, std::move(scene.shading)};
     }
     if (a.source_normals.empty() || a.source_albedo.empty())
-        throw InputError("a source of plain maps needs both maps",
+        throw UsageError("a source of plain maps needs both maps",
                          "give --source-normals FILE and --source-albedo FILE");
     const cv::Mat1b mask = a.source_mask.empty() ? cv::Mat1b() : read_mask(a.source_mask);
     TransferSource maps;
     maps.normals = mask.empty() ? read_normal_map(a.source_normals) : read_normal_map(a.source_normals, mask);
     maps.albedo = read_albedo_map(a.source_albedo, mask.empty() ? maps.normals.valid : mask);
+    if (a.source_albedo.extension() != ".exr") maps.white = 1.0F;
     return {std::move(maps), std::nullopt};
 }
 
-NormalMap load_target(const Arguments& a) {
-    if (fs::is_directory(a.target)) return load_scene(Session::open(a.target)).normals;
-    return a.target_mask.empty() ? read_normal_map(a.target) : read_normal_map(a.target, read_mask(a.target_mask));
+/// The target's normals, and where its surface lies where near lamps are to light it.
+struct Target {
+    NormalMap normals;
+    SceneGeometry geometry = {};
+};
+
+Target load_target(const Arguments& a) {
+    const bool near = !a.relight.lamp_positions.empty();
+    if (fs::is_directory(a.target)) {
+        const Session session = Session::open(a.target);
+        Target target{load_scene(session).normals};
+        if (near) target.geometry = load_geometry(session);
+        return target;
+    }
+    if (near)
+        throw InputError("a plain map as target does not say where its pixels lie, which --light-position needs",
+                         "use a processed session as --target, or --light");
+    return a.target_mask.empty() ? Target{read_normal_map(a.target)}
+                                 : Target{read_normal_map(a.target, read_mask(a.target_mask))};
 }
 
 ControlMaps load_control(const Arguments& a) {
     if (a.source_control.empty() != a.target_control.empty())
-        throw InputError("a control map has two sides", "give --control-source FILE and --control-target FILE");
+        throw UsageError("a control map has two sides", "give --control-source FILE and --control-target FILE");
     if (a.source_control.empty()) return {};
     return {read_picture(a.source_control).samples, read_picture(a.target_control).samples};
 }
@@ -110,38 +128,46 @@ std::vector<CarriedMap> load_carried(const Arguments& a, cv::Size source) {
 /// relit-1.png, relit-2.png, ... one for each light, then one for each environment.
 std::vector<fs::path> write_relit_pictures(const Arguments& a, const RelightScene& scene, const WorkContext& work) {
     const RelightOptions options = relight_options(a.relight);
-    const PictureStyle style{.gain = viewing_gain(scene.albedo.albedo, scene.albedo.valid)};
     const Relighter relighter(scene, work);
     std::vector<fs::path> written;
-    const auto write = [&](const Lighting& lighting) {
+    const auto write = [&](const Lighting& lighting, double gain) {
         written.push_back(a.out / fmt::format("relit-{}.png", written.size() + 1));
-        render_to_file(relighter, lighting, options, style, written.back(), work);
+        render_to_file(relighter, lighting, options, {.gain = gain}, written.back(), work);
     };
-    for (const std::string& light : a.relight.lights) write(Lights{parse_light(light)});
-    for (const std::string& file : a.relight.environments) write(relighter.fold(read_environment(file), options, work));
+    const double gain = viewing_gain(scene.albedo.albedo, scene.albedo.valid);
+    for (const Light& light : lights_of(a.relight, scene)) write(Lights{light}, gain);
+    for (const std::string& file : a.relight.environments) {
+        const FoldedEnvironment folded = relighter.fold(read_environment(file), options, work);
+        write(folded, gain_under(folded, relighter, options, scene.normals.valid, work));
+    }
     return written;
 }
 
+Json json_of(const std::optional<double>& figure) { return figure ? Json(*figure) : Json(); }
+
 CommandResult run(const Arguments& a, const WorkContext& work) {
-    const bool relit_wanted = !a.relight.lights.empty() || !a.relight.environments.empty();
+    const bool relit_wanted =
+        !a.relight.lights.empty() || !a.relight.lamp_positions.empty() || !a.relight.environments.empty();
     require_outside_payload(a.out);
     if (!a.source.empty() && !a.source_mask.empty())
-        throw InputError("--source-mask goes with plain maps, a session has its own", "leave it out");
+        throw UsageError("--source-mask goes with plain maps, a session has its own", "leave it out");
     // What will be needed after the long work is refused before it.
     relight_options(a.relight);
-    for (const std::string& light : a.relight.lights) parse_light(light);
+    require_readable_lights(a.relight);
     for (const std::string& file : a.relight.environments) read_environment(file);
     const Source source = load_source(a);
     if (relit_wanted && !source.shading)
         throw InputError("plain maps cannot be relit: they have no shading maps",
                          "use a processed session as --source");
-    const NormalMap target = load_target(a);
+    const Target target = load_target(a);
     const ControlMaps control = load_control(a);
     const std::vector<CarriedMap> carried = load_carried(a, source.maps.normals.valid.size());
-    const TransferResult moved = transfer_texture(source.maps, target, a.options, work, control);
+    const TransferResult moved = transfer_texture(source.maps, target.normals, a.options, work, control);
 
-    write_png(a.out / "albedo.png",
-              viewable(moved.albedo.albedo, viewing_gain(source.maps.albedo.albedo, source.maps.albedo.valid)));
+    // A picture's colours come out as they went in; radiance has no white of its own.
+    const AlbedoMap& albedo = source.maps.albedo;
+    const double gain = source.maps.white ? 1.0 / *source.maps.white : viewing_gain(albedo.albedo, albedo.valid);
+    write_png(a.out / "albedo.png", viewable(moved.albedo.albedo, gain));
     write_albedo_map(a.out / "albedo.exr", moved.albedo);
     write_coordinates(a.out / "coordinates.png", moved.coordinates);
     if (moved.index.texels > 0) write_index_map(a.out / "index.png", moved.index);
@@ -151,14 +177,15 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
     for (const CarriedMap& map : carried) write_map_picture(a.out / map.name, map.map.read_through(moved.coordinates));
     std::vector<fs::path> relit;
     if (relit_wanted)
-        relit = write_relit_pictures(a, {moved.normals, moved.albedo, moved.index, *source.shading}, work);
+        relit =
+            write_relit_pictures(a, {moved.normals, moved.albedo, moved.index, *source.shading, target.geometry}, work);
 
     CommandResult result;
     result.json = {{"out", a.out.string()},
                    {"seconds", moved.seconds},
-                   {"patch_energy", moved.patch_energy},
+                   {"patch_energy", json_of(moved.patch_energy)},
                    {"coherence", moved.coherence},
-                   {"histogram_distance", moved.histogram_distance},
+                   {"histogram_distance", json_of(moved.histogram_distance)},
                    {"coverage_deg", moved.coverage_deg},
                    {"relit", Json::array()},
                    {"applied", Json::array()}};
@@ -170,9 +197,9 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
             fmt::format("the source does not show all of the target's normals: 5 % of them are more than {:.0f} "
                         "degrees from any of the source's; uncovered.exr shows where",
                         moved.coverage_deg));
-    result.text =
-        fmt::format("{}: {} x {} pixels in {:.1f} s, coherence {:.2f}, patch energy {:.1f}", a.out.string(),
-                    moved.coordinates.cols, moved.coordinates.rows, moved.seconds, moved.coherence, moved.patch_energy);
+    result.text = fmt::format("{}: {} x {} pixels in {:.1f} s, coherence {:.2f}", a.out.string(),
+                              moved.coordinates.cols, moved.coordinates.rows, moved.seconds, moved.coherence);
+    if (moved.patch_energy) result.text += fmt::format(", patch energy {:.1f}", *moved.patch_energy);
     return result;
 }
 
@@ -192,7 +219,7 @@ void add_transfer_command(CommandLine& line) {
     command.add_option("--target-mask", a->target_mask, "White on the target, for a plain normal map");
     command.add_option("--out", a->out, "Folder for albedo, index, coordinates, normals and relit-*.png")->required();
     command.add_option("--method", a->options.method, "analogies, patchmatch or preview (default: patchmatch)")
-        ->transform(CLI::CheckedTransformer(methods).description("{analogies,patchmatch,preview}"));
+        ->transform(one_of(methods));
     command.add_option("--apply", a->apply, "Other maps of the source, carried over in their own format")
         ->expected(1, -1);
     command.add_option("--control-source", a->source_control, "patchmatch: a drawn guide, 8- or 16-bit PNG or EXR");
@@ -204,6 +231,8 @@ void add_transfer_command(CommandLine& line) {
     command.add_option("--window", a->options.window, "Side of the window, pixels, odd")->capture_default_str();
     command.add_option("--coarse-window", a->options.coarse_window, "analogies: side of the window one level up, odd")
         ->capture_default_str();
+    command.add_flag("--exact-search", a->options.exact_search,
+                     "analogies: compare with every pixel of the source, for tests: slow");
     command.add_option("--kappa", a->options.kappa, "Coherence weight: what continues a neighbour's patch wins")
         ->capture_default_str();
     command.add_option("--normal-weight", a->options.normal_weight, "Weight of normals against albedo")

@@ -56,9 +56,14 @@ CaptureOrder capture_order_from(const Json& json) {
             order.resume = text(value, key);
         } else if (key == "lamps") {
             order.lamps = texts(value, key);
+        } else if (key == "mode") {
+            order.mode = sync_mode_from_name(text(value, key));
+            if (!order.mode)
+                throw InputError(fmt::format("unknown mode \"{}\"", text(value, key)),
+                                 "known: settled, predictive, strobed");
         } else if (key != "process") {  // what is to follow is the queue's concern
             throw InputError(fmt::format("unknown key \"{}\"", key.substr(0, longest_text)),
-                             "known: object, lamps, name, resume");
+                             "known: object, lamps, mode, name, resume");
         }
     }
     return order;
@@ -109,6 +114,7 @@ Json to_json(const CaptureOrder& order) {
     if (!order.object.empty()) json["object"] = order.object;
     if (!order.name.empty()) json["name"] = order.name;
     if (!order.lamps.empty()) json["lamps"] = order.lamps;
+    if (order.mode) json["mode"] = name(*order.mode);
     if (order.resume) json["resume"] = *order.resume;
     return json;
 }

@@ -26,6 +26,8 @@ public:
     virtual ~CaptureRig() = default;
     /// The whole capture, sealed; throws what capture_session() throws. Lamps are dark afterwards.
     virtual CaptureOutcome capture(const CaptureRequest& request, const WorkContext& work) = 0;
+    /// Lends the devices for a measurement; the lamps are dark afterwards. Throws what `work` throws.
+    virtual void lend(const std::function<void(const CaptureDevices&)>& work) = 0;
     /// Throws DeviceError when darkness cannot be confirmed.
     virtual void dark() = 0;
 };

@@ -50,9 +50,9 @@ static_assert(migrations.size() == catalog_version);
 void migrate(SQLite::Database& database, const std::string& file) {
     const int found = database.execAndGet("PRAGMA user_version").getInt();
     if (found > catalog_version)
-        throw InputError(fmt::format("{} is of a newer darkbox (version {}, this one knows {})", file, found,
-                                     catalog_version),
-                         "upgrade darkbox, or remove the file: darkbox sessions --rebuild makes it again");
+        throw InputError(
+            fmt::format("{} is of a newer darkbox (version {}, this one knows {})", file, found, catalog_version),
+            "upgrade darkbox, or remove the file: darkbox sessions --rebuild makes it again");
     for (int version = found; version < catalog_version; ++version) {
         SQLite::Transaction transaction(database);
         database.exec(migrations[static_cast<std::size_t>(version)]);

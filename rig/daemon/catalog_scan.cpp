@@ -56,16 +56,15 @@ std::optional<CatalogCalibration> scan_calibration(const fs::path& session, cons
     try {
         const StoredCalibration stored = read_calibration(file);
         const Lights& lights = stored.calibration.lights;
-        return CatalogCalibration{
-            .session = listing.name,
-            .created = listing.created,
-            .rig = stored.rig.name,
-            .lamps = lights.size(),
-            .used = static_cast<std::size_t>(std::ranges::count(lights, true, &Light::used)),
-            .condition_number = stored.calibration.condition_number,
-            .sigma_deg = median_sigma_deg(lights),
-            .intensities_known = stored.calibration.intensity_origin != IntensityOrigin::unknown,
-            .warnings = stored.calibration.warnings.size()};
+        return CatalogCalibration{.session = listing.name,
+                                  .created = listing.created,
+                                  .rig = stored.rig.name,
+                                  .lamps = lights.size(),
+                                  .used = static_cast<std::size_t>(std::ranges::count(lights, true, &Light::used)),
+                                  .condition_number = stored.calibration.condition_number,
+                                  .sigma_deg = median_sigma_deg(lights),
+                                  .intensities_known = stored.calibration.intensity_origin != IntensityOrigin::unknown,
+                                  .warnings = stored.calibration.warnings.size()};
     } catch (const Error&) {
         return std::nullopt;
     }

@@ -8,7 +8,9 @@
 #include "acquisition/camera/v4l2_camera.h"
 #include "acquisition/device/device_error.h"
 #include "acquisition/frame/error.h"
+#include "rig/capture/timing_store.h"
 #include "rig/lamps/gpio_lamps.h"
+#include "rig/lamps/usb_lamps.h"
 #include "sim/sim_rig.h"
 
 namespace darkbox {
@@ -27,14 +29,21 @@ V4l2Options v4l2_options(const CameraDescription& camera) {
     return options;
 }
 
+std::optional<MeasuredTiming> measured(const CameraInfo& camera) {
+    return stored_timing(default_timing_file(), camera);
+}
+
+/// Its camera sees simulated lamps, or those of an emulated board, which are driven as real ones.
 class SimulatedRig final : public CaptureRig {
 public:
-    explicit SimulatedRig(const RigDescription& rig) : rig_(rig), sim_(sim::SimRig::make(rig)) {}
+    SimulatedRig(const RigDescription& rig, std::unique_ptr<LampArray> driven)
+        : rig_(rig), sim_(sim::SimRig::make(rig)), driven_(std::move(driven)) {}
 
     CaptureOutcome capture(const CaptureRequest& request, const WorkContext& work) override {
         const auto start = Stopwatch::now();
         sim_ = sim::SimRig::make(rig_);  // its truth is of this capture alone
-        const auto [session, summary] = capture_session(request, rig_, sim_.lamps(), sim_.camera(), sim_.clock(), work);
+        const auto [session, summary] =
+            capture_session(request, rig_, lamps(), sim_.camera(), sim_.clock(), work, measured);
         write_truth(session.folder());
         return {.session = session.folder(),
                 .frames = session.frames().size(),
@@ -43,9 +52,16 @@ public:
                 .duration = Stopwatch::now() - start};
     }
 
-    void dark() override { sim_.lamps().dark(); }
+    void lend(const std::function<void(const CaptureDevices&)>& work) override {
+        const DarkOnExit dark_on_exit(lamps());
+        work({lamps(), sim_.camera(), sim_.clock()});
+    }
+
+    void dark() override { lamps().dark(); }
 
 private:
+    LampArray& lamps() { return driven_ ? *driven_ : static_cast<LampArray&>(sim_.lamps()); }
+
     /// All of it or nothing: the session is sealed by now and complete without it.
     void write_truth(const std::filesystem::path& session) const {
         const auto partial = session / "truth.partial";
@@ -65,6 +81,7 @@ private:
 
     RigDescription rig_;
     sim::SimRig sim_;
+    std::unique_ptr<LampArray> driven_;
 };
 
 /// Real devices; the lamps go first when it ends, so that a camera that hangs leaves them dark.
@@ -75,12 +92,17 @@ public:
 
     CaptureOutcome capture(const CaptureRequest& request, const WorkContext& work) override {
         const auto start = Stopwatch::now();
-        const auto [session, summary] = capture_session(request, rig_, *lamps_, camera_, clock_, work);
+        const auto [session, summary] = capture_session(request, rig_, *lamps_, camera_, clock_, work, measured);
         return {.session = session.folder(),
                 .frames = session.frames().size(),
                 .resumed = summary.resumed,
                 .repeated = summary.repeated,
                 .duration = Stopwatch::now() - start};
+    }
+
+    void lend(const std::function<void(const CaptureDevices&)>& work) override {
+        const DarkOnExit dark_on_exit(*lamps_);
+        work({*lamps_, camera_, clock_});
     }
 
     void dark() override { lamps_->dark(); }
@@ -103,12 +125,12 @@ std::unique_ptr<LampArray> Hardware::open_lamps() {
     if (guardian_) return std::make_unique<GpioLamps>(rig_, *guardian_);
     if (rig_.lamps_driver == "sim")
         throw InputError("simulated lamps shine in a simulated capture alone", "darkbox capture --simulate 12");
-    throw InputError(fmt::format("this build has no lamps driver \"{}\" yet", rig_.lamps_driver),
-                     "use driver = \"gpio\" or \"sim\" under [lamps]");
+    return std::make_unique<UsbLamps>(rig_);
 }
 
 std::unique_ptr<CaptureRig> Hardware::open() {
-    if (rig_.camera.driver == "sim") return std::make_unique<SimulatedRig>(rig_);
+    if (rig_.camera.driver == "sim")
+        return std::make_unique<SimulatedRig>(rig_, rig_.lamps_driver == "sim" ? nullptr : open_lamps());
     return std::make_unique<RealRig>(rig_, open_lamps());
 }
 

@@ -16,6 +16,7 @@ namespace darkbox {
 struct CaptureOrder {
     std::string object = {};
     std::vector<std::string> lamps = {};     ///< names; empty = all
+    std::optional<SyncMode> mode = {};       ///< none: the one of rig.toml
     std::string name = {};                   ///< of the session; empty = made from object and date
     std::optional<std::string> resume = {};  ///< name of an interrupted session
 };

@@ -100,7 +100,8 @@ CaptureRequest Service::request_for(const CaptureOrder& order, int attempt) cons
     CaptureRequest request{.folder = session_path(options_.sessions, session),
                            .object = order.object,
                            .lamps = order.lamps,
-                           .start = resumes ? CaptureStart::resume : CaptureStart::create};
+                           .start = resumes ? CaptureStart::resume : CaptureStart::create,
+                           .mode = order.mode};
     const bool there = std::filesystem::exists(request.folder);
     if (resumes && !there)
         throw NotFound(fmt::format("there is no session \"{}\"", session), "darkbox sessions lists them");

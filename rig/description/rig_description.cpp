@@ -23,6 +23,8 @@ constexpr double nearest_lamp_mm = 10;
 constexpr double farthest_lamp_mm = 100'000;
 constexpr double farthest_principal_px = 100'000;
 constexpr double intrinsics_agree_within = 0.01;
+constexpr double longest_usb_on_s = 60;
+constexpr std::size_t longest_usb_serial = 12;
 
 Seconds milliseconds(double ms) { return Seconds(ms / 1000.0); }
 double as_milliseconds(Seconds s) { return s.count() * 1000.0; }
@@ -96,12 +98,22 @@ void read_output(TomlSection& section, const RigDescription& rig, bool active_lo
 
 LampDescription read_lamp(TomlSection& section, const RigDescription& rig, bool active_low) {
     LampDescription lamp;
-    section.allow({"name", "line", "active_low", "address", "channel", "position_mm", "max_on_s", "settle_ms"});
+    section.allow(
+        {"name", "line", "active_low", "address", "channel", "position_mm", "max_on_s", "max_duty", "settle_ms"});
     lamp.name = read_lamp_name(section);
     const Seconds exposure = rig.camera.exposure;
     read_output(section, rig, active_low, lamp);
     lamp.position_mm = read_position(section);
     lamp.max_on = Seconds(section.number("max_on_s", {0.001, 600}).value_or(lamp.max_on.count()));
+    if (section.has("max_duty") && rig.lamps_driver != "usb")
+        section.fail("max_duty", fmt::format("max_duty does not belong to driver \"{}\"", rig.lamps_driver),
+                     "leave it out: only the USB lamp controller keeps to it");
+    lamp.max_duty = section.number("max_duty", {0.02, 0.79}).value_or(lamp.max_duty);
+    if (rig.lamps_driver == "usb" && lamp.max_on.count() > longest_usb_on_s)
+        section.fail(
+            "max_on_s",
+            fmt::format("max_on_s is {}; allowed with driver \"usb\": up to {}", lamp.max_on.count(), longest_usb_on_s),
+            "lower max_on_s: the USB lamp controller lets no lamp shine longer");
     lamp.settle = milliseconds(section.number("settle_ms", {0, 10'000}).value_or(as_milliseconds(lamp.settle)));
     if (lamp.max_on <= lamp.settle + exposure)
         section.fail("max_on_s",
@@ -166,8 +178,20 @@ bool read_gpio(TomlSection& section, GpioDescription& gpio) {
     return section.flag("active_low").value_or(false);
 }
 
+UsbDescription read_usb(TomlSection& section) {
+    section.allow({"serial", "heartbeat_ms"});
+    UsbDescription usb;
+    usb.serial = section.text("serial").value_or("");
+    if (usb.serial.size() > longest_usb_serial)
+        section.fail("serial",
+                     fmt::format("serial has {} characters; allowed: up to {}", usb.serial.size(), longest_usb_serial),
+                     "darkbox lamps list --boards lists the serials of the lamp controllers");
+    usb.heartbeat = milliseconds(section.number("heartbeat_ms", {50, 1000}).value_or(as_milliseconds(usb.heartbeat)));
+    return usb;
+}
+
 void read_lamps(TomlSection& section, RigDescription& rig) {
-    section.allow({"driver", "distant", "gpio", "lamp"});
+    section.allow({"driver", "distant", "gpio", "usb", "lamp"});
     rig.lamps_driver = section.choice("driver", rig.lamps_driver, {"gpio", "usb", "sim"});
     const bool simulated_distant = rig.lamps_driver == "sim" && !has_word(rig.sim.scene, "near");
     rig.distant_lamps = section.flag("distant").value_or(simulated_distant);
@@ -177,6 +201,11 @@ void read_lamps(TomlSection& section, RigDescription& rig) {
         section.fail("gpio", fmt::format("has [lamps.gpio], but driver \"{}\"", rig.lamps_driver),
                      "remove [lamps.gpio], or write driver = \"gpio\"");
     if (gpio) active_low = read_gpio(*gpio, rig.gpio);
+    auto usb = section.section("usb", "[lamps.usb]");
+    if (usb && rig.lamps_driver != "usb")
+        section.fail("usb", fmt::format("has [lamps.usb], but driver \"{}\"", rig.lamps_driver),
+                     "remove [lamps.usb], or write driver = \"usb\"");
+    if (usb) rig.usb = read_usb(*usb);
     std::vector<TomlSection> lamps = section.sections("lamp", "[[lamps.lamp]]");
     if (lamps.empty()) section.fail("lamp", "holds no lamp; allowed: 1 to 64", "add a [[lamps.lamp]] for each lamp");
     for (TomlSection& lamp : lamps) {
@@ -278,7 +307,9 @@ CameraDescription read_camera(TomlSection& section) {
 
 CaptureDescription read_capture(TomlSection& section) {
     CaptureDescription capture;
-    section.allow({"frame_deadline_s", "tries", "min_signal", "max_dark"});
+    section.allow({"mode", "frame_deadline_s", "tries", "min_signal", "max_dark"});
+    capture.mode = *sync_mode_from_name(
+        section.choice("mode", std::string(name(capture.mode)), {"settled", "predictive", "strobed"}));
     capture.frame_deadline =
         Seconds(section.number("frame_deadline_s", {0.01, 600}).value_or(capture.frame_deadline.count()));
     capture.tries = static_cast<int>(section.integer("tries", {1, 100}).value_or(capture.tries));
@@ -290,7 +321,7 @@ CaptureDescription read_capture(TomlSection& section) {
 SimDescription read_sim(TomlSection& section) {
     SimDescription sim;
     section.allow({"scene", "width", "height", "bit_depth", "full_well_e", "read_noise_e", "latency_frames",
-                   "queue_depth", "seed", "real_time"});
+                   "queue_depth", "seed", "real_time", "lamps_seen"});
     const auto whole = [&](const char* key, Allowed<std::int64_t> allowed, int fallback) {
         return static_cast<int>(section.integer(key, allowed).value_or(fallback));
     };
@@ -306,6 +337,10 @@ SimDescription read_sim(TomlSection& section) {
     sim.seed =
         static_cast<std::uint64_t>(section.integer("seed", any_seed).value_or(static_cast<std::int64_t>(sim.seed)));
     sim.real_time = section.flag("real_time").value_or(sim.real_time);
+    sim.lamps_seen = section.text("lamps_seen").value_or("");
+    if (!sim.lamps_seen.empty() && !sim.real_time)
+        section.fail("lamps_seen", "has lamps_seen without real_time",
+                     "add real_time = true: real lamps know no virtual time");
     return sim;
 }
 
@@ -348,9 +383,13 @@ RigDescription read_rig(TomlSection& root) {
     settle_simulated_camera(rig);
     if (!lamps) root.fail("lamps", "has no [lamps]", "add [lamps] with a [[lamps.lamp]] for each lamp");
     read_lamps(*lamps, rig);
-    if ((rig.camera.driver == "sim") != (rig.lamps_driver == "sim"))
+    const bool sees_lamps = rig.camera.driver == "sim" && !rig.sim.lamps_seen.empty();
+    if ((rig.camera.driver == "sim") != (rig.lamps_driver == "sim") && !sees_lamps)
         root.fail("lamps", fmt::format("has a \"{}\" camera and \"{}\" lamps", rig.camera.driver, rig.lamps_driver),
                   "a simulated camera sees simulated lamps only: make both \"sim\" or neither");
+    if (sees_lamps && rig.lamps_driver != "usb")
+        root.fail("sim", fmt::format("has lamps_seen, but \"{}\" lamps", rig.lamps_driver),
+                  "remove it: an emulated USB lamp controller writes what it tells of");
     return rig;
 }
 
@@ -361,6 +400,24 @@ void refuse_huge(std::uintmax_t size, const std::string& origin) {
 }
 
 }  // namespace
+
+std::string_view name(SyncMode mode) {
+    switch (mode) {
+        case SyncMode::settled:
+            return "settled";
+        case SyncMode::predictive:
+            return "predictive";
+        case SyncMode::strobed:
+            break;
+    }
+    return "strobed";
+}
+
+std::optional<SyncMode> sync_mode_from_name(std::string_view text) {
+    for (const SyncMode mode : {SyncMode::settled, SyncMode::predictive, SyncMode::strobed})
+        if (name(mode) == text) return mode;
+    return std::nullopt;
+}
 
 RigDescription parse_rig(const std::string& toml, const std::string& origin) {
     refuse_huge(toml.size(), origin);

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "acquisition/frame/units.h"
@@ -20,6 +21,7 @@ struct LampDescription {
     int address = -1;                     ///< driver "gpio", multiplexed: what the decoder turns into this lamp
     std::array<double, 3> position_mm{};  ///< rig frame: x right, y up, z to the camera, origin at the object
     Seconds max_on{2.0};                  ///< longest continuous on-time
+    double max_duty = 0.5;                ///< driver "usb": share of a long time that it may shine
     Seconds settle{0.005};                ///< from switch to steady light
 };
 
@@ -34,6 +36,12 @@ struct MultiplexerDescription {
 struct GpioDescription {
     std::string chip;                                   ///< its label
     std::optional<MultiplexerDescription> multiplexer;  ///< none: one line a lamp
+};
+
+/// [lamps.usb], of driver "usb".
+struct UsbDescription {
+    std::string serial;      ///< empty: the only lamp controller there is
+    Seconds heartbeat{1.0};  ///< silence after which the controller darkens the lamps
 };
 
 struct CameraDescription {
@@ -51,7 +59,17 @@ struct CameraDescription {
     std::optional<std::array<double, 2>> principal_px;  ///< none: the picture's centre
 };
 
+/// How lamps and exposures are kept together.
+enum class SyncMode {
+    settled,     ///< switch, wait for the first frame that begins after it: two frame periods a lamp or more
+    predictive,  ///< switch in the gap between exposures, found from the timestamps: one frame period a lamp
+    strobed,     ///< the lamp controller steps at the camera's strobe: one frame period a lamp
+};
+std::string_view name(SyncMode mode);
+std::optional<SyncMode> sync_mode_from_name(std::string_view name);
+
 struct CaptureDescription {
+    SyncMode mode = SyncMode::settled;
     Seconds frame_deadline{5.0};  ///< the longest wait for one frame
     int tries = 3;                ///< per shot, before the session fails
     double min_signal = 0.002;    ///< a lit frame's mean must exceed the dark frame's by this share of full scale
@@ -70,7 +88,8 @@ struct SimDescription {
     int latency_frames = 1;
     int queue_depth = 2;
     std::uint64_t seed = 1;
-    bool real_time = false;  ///< virtual time otherwise
+    bool real_time = false;              ///< virtual time otherwise
+    std::filesystem::path lamps_seen{};  ///< the camera sees the lamps that this file tells of, not simulated ones
 };
 
 /// A rig.toml, parsed and valid. Plain data.
@@ -79,6 +98,7 @@ struct RigDescription {
     CameraDescription camera;
     std::string lamps_driver = "sim";  ///< "gpio", "usb" or "sim"
     GpioDescription gpio;
+    UsbDescription usb;
     std::vector<LampDescription> lamps;
     bool distant_lamps = false;  ///< their light is parallel: behind collimators, or simulated so
     std::optional<double> ball_diameter_mm;

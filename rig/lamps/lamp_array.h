@@ -9,6 +9,8 @@
 
 namespace darkbox {
 
+class StrobedLamps;
+
 struct LampHealth {
     bool reachable = true;
     std::vector<std::string> problems;  ///< sentences for people; empty when all is well
@@ -25,6 +27,8 @@ public:
     /// All lamps dark. Throws DeviceError when that cannot be confirmed.
     virtual void dark() = 0;
     virtual LampHealth health() = 0;
+    /// The same lamps as stepped by the camera's strobe; null for lamps without such a line. Lives as long as this.
+    virtual StrobedLamps* strobed() { return nullptr; }
 };
 
 /// Darkens the lamps on every way out of a scope. The destructor swallows the error: by then one is already under way.

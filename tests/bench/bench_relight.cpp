@@ -131,6 +131,22 @@ void floats_one_light(benchmark::State& state) {
     count(state, 40);
 }
 
+void bytes_near_lamp(benchmark::State& state, ReflectanceModel model) {
+    RelightScene scene = scene_of(size_of(state));
+    scene.geometry.view = ViewGeometry{0.1, {0.5 * size_of(state).width, 0.5 * size_of(state).height}, 500};
+    scene.geometry.height_mm = cv::Mat1f(size_of(state), 3.0F);
+    const Relighter relighter(scene);
+    const RelightOptions options = options_of(model);
+    cv::Mat3b image(relighter.size());
+    int frame = 0;
+    for (auto _ : state) {
+        Light lamp = light_of_frame(frame++);
+        lamp.near = LampPosition{150 * lamp.direction};
+        relighter.render({lamp}, options, Encoding::srgb, image);
+    }
+    count(state, bytes_in + bytes_out + 4);
+}
+
 Environment sky() {
     Environment probe{cv::Mat3f(128, 256)};
     for (int y = 0; y < 128; ++y)
@@ -163,6 +179,8 @@ BENCHMARK_CAPTURE(bytes_one_light, lambert, ReflectanceModel::lambert, Encoding:
 BENCHMARK_CAPTURE(bytes_one_light, lambert_linear, ReflectanceModel::lambert, Encoding::linear)->Apply(sizes);
 BENCHMARK_CAPTURE(bytes_one_light, phong, ReflectanceModel::phong, Encoding::srgb)->Apply(sizes);
 BENCHMARK_CAPTURE(bytes_one_light, phong_split, ReflectanceModel::phong_split, Encoding::srgb)->Apply(sizes);
+BENCHMARK_CAPTURE(bytes_near_lamp, lambert, ReflectanceModel::lambert)->Apply(sizes);
+BENCHMARK_CAPTURE(bytes_near_lamp, phong, ReflectanceModel::phong)->Apply(sizes);
 BENCHMARK_CAPTURE(bytes_environment, lambert, ReflectanceModel::lambert)->Apply(sizes);
 BENCHMARK_CAPTURE(bytes_environment, phong_split, ReflectanceModel::phong_split)->Apply(sizes);
 BENCHMARK(floats_one_light)->Apply(sizes);

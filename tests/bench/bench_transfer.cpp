@@ -36,8 +36,8 @@ void transfer(benchmark::State& state, TransferMethod method) {
     state.counters["peak_MiB"] = peak_mib();
     state.counters["us_per_pixel"] = result.seconds * 1e6 / side / side;
     state.counters["coherence"] = result.coherence;
-    state.counters["patch_energy"] = result.patch_energy;
-    state.counters["histogram_distance"] = result.histogram_distance;
+    state.counters["patch_energy"] = result.patch_energy.value();
+    state.counters["histogram_distance"] = result.histogram_distance.value();
 }
 
 void growth(benchmark::internal::Benchmark* bench) {

@@ -32,7 +32,7 @@ std::string text_of(const std::filesystem::path& file);
 void put(const std::string& text, const std::filesystem::path& file);
 
 /// Asked again and again; emulation is slow, so the limit is far from what a real machine takes.
-bool comes_true(const std::function<bool()>& condition, std::chrono::seconds limit = std::chrono::seconds(10));
+bool comes_true(const std::function<bool()>& condition, std::chrono::seconds limit = std::chrono::seconds(40));
 
 /// A program of this build.
 std::string program(const std::string& name);

@@ -3,6 +3,7 @@
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <avr/pgmspace.h>
+#include <avr/power.h>
 #include <avr/sleep.h>
 #include <avr/wdt.h>
 #include <string.h>
@@ -25,10 +26,10 @@ namespace board {
 using namespace lamp_protocol;
 using lampctl::Controller;
 
-/// Read by whoever flashes this image.
-extern const ImageMark image_mark;
-const ImageMark image_mark __attribute__((progmem, used)) = {DARKBOX_LAMP_IMAGE_MAGIC, version_major, version_minor,
-                                                             firmware_major, firmware_minor};
+/// Read by whoever flashes this image; the linker is told to keep what no code refers to.
+extern "C" const ImageMark darkbox_image_mark;
+const ImageMark darkbox_image_mark __attribute__((progmem, used)) = {DARKBOX_LAMP_IMAGE_MAGIC, version_major,
+                                                                     version_minor, firmware_major, firmware_minor};
 
 namespace {
 
@@ -156,6 +157,14 @@ private:
 Service service;
 UsbDevice usb(service);
 
+/// Works with the fuses that the chip is sold with, too: those divide the clock by 8, and give the thermistor's pin to
+/// JTAG.
+void overrule_fuses() {
+    clock_prescale_set(clock_div_1);
+    MCUCR = _BV(JTD);
+    MCUCR = _BV(JTD);  // takes effect when written twice within four cycles
+}
+
 void start_inputs() {
     PORTD &= static_cast<uint8_t>(~strobe_pin);
     EICRA = _BV(ISC01) | _BV(ISC00);  // rising edge
@@ -238,6 +247,7 @@ ISR(INT0_vect) {
 int main() {
     using namespace darkbox::board;
     chain.start();
+    overrule_fuses();
     stay_detached();
     take_identity();
     start_clock();

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "processing/formats/jpeg_writer.h"
 #include "processing/formats/png.h"
 
 namespace darkbox {

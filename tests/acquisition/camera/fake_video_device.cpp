@@ -95,7 +95,7 @@ int FakeVideoDevice::answer(unsigned long request, void* argument) {
             return 0;
         case VIDIOC_G_SELECTION:
         case VIDIOC_S_SELECTION:
-            return crops ? select(*static_cast<v4l2_selection*>(argument)) : ENOTTY;
+            return crops ? select(*static_cast<v4l2_selection*>(argument)) : refuses_crop_with;
         case VIDIOC_QUERYCTRL:
             return query_control(*static_cast<v4l2_queryctrl*>(argument));
         case VIDIOC_S_CTRL:

@@ -3,6 +3,7 @@
 #include <linux/videodev2.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <deque>
 #include <functional>
 #include <map>
@@ -83,6 +84,7 @@ public:
     std::map<std::uint32_t, FakeControl> live_controls;  ///< now
     std::uint32_t padding = 0;                           ///< bytes behind each row
     bool crops = false;
+    int refuses_crop_with = ENOTTY;
     bool mute = false;                                ///< no frame comes
     std::map<unsigned long, std::deque<int>> errors;  ///< of the next calls of a request
     std::function<void(FakeFrame&)> script;

@@ -130,7 +130,10 @@ TEST_F(V4l2CameraTest, ACropIsReadBack) {
 
 TEST_F(V4l2CameraTest, ACropThatACameraCannotDoIsRefused) {
     options.crop = {8, 8, 32, 16};
-    EXPECT_THAT(failure<InputError>([&] { camera().configure({}); }), HasSubstr("crop is [8, 8, 32, 16]"));
+    for (const int error : {ENOTTY, EINVAL, ENODATA}) {
+        kernel.refuses_crop_with = error;
+        EXPECT_THAT(failure<InputError>([&] { camera().configure({}); }), HasSubstr("crop is [8, 8, 32, 16]"));
+    }
 }
 
 TEST_F(V4l2CameraTest, EverythingAutomaticIsOffAndEveryImprovementNeutral) {

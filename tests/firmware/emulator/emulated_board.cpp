@@ -127,6 +127,10 @@ EmulatedBoard::~EmulatedBoard() { avr_terminate(chip_->avr); }
 std::uint64_t EmulatedBoard::cycle() const { return chip_->avr->cycle; }
 
 void EmulatedBoard::step() {
+    if (in_bootloader()) {  // the chip's own loader is not here; time passes in it
+        chip_->avr->cycle += cycles_per_us;
+        return;
+    }
     const int state = avr_run(chip_->avr);
     if (state == cpu_Done || state == cpu_Crashed) throw std::runtime_error("the emulated chip stopped");
     const std::uint32_t pc = chip_->avr->pc;
@@ -265,10 +269,6 @@ EmulatedBoard::Handshake EmulatedBoard::in(std::uint8_t endpoint, std::vector<st
 }
 
 bool EmulatedBoard::setup_waits() const { return (chip_->endpoint_flags(0) & 1 << 3) != 0; }
-
-bool EmulatedBoard::has_packet(std::uint8_t endpoint) const {
-    return (chip_->endpoint_flags(endpoint) & (1 << 0 | 1 << 7)) == 0;
-}
 
 void EmulatedBoard::bus_reset() { avr_ioctl(chip_->avr, AVR_IOCTL_USB_RESET, nullptr); }
 

@@ -74,8 +74,6 @@ public:
     Handshake in(std::uint8_t endpoint, std::vector<std::uint8_t>& bytes);
     /// Whether the firmware has not read a SETUP yet.
     bool setup_waits() const;
-    /// Whether an IN endpoint holds a packet for the host.
-    bool has_packet(std::uint8_t endpoint) const;
     void bus_reset();
 
     std::function<void(const LampsSeen&)> on_lamps;

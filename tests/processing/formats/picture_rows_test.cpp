@@ -2,11 +2,18 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <png.h>
 #include <tiffio.h>
 
+#include <cstdio>
 #include <filesystem>
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+#include <vector>
+
+#include <jpeglib.h>  // needs <cstdio> before it
 
 #include "processing/formats/atomic_file.h"
 #include "processing/formats/exr.h"
@@ -44,14 +51,25 @@ cv::Mat3f read_in_steps(const Path& path, int step) {
     return samples;
 }
 
-void expect_as_read_whole(const Path& path) {
-    const cv::Mat3f expected = read_picture(path).samples;
+/// An independent reader's R, G, B as 0...1.
+cv::Mat3f read_by_opencv(const Path& path) {
+    const cv::Mat bgr =
+        cv::imread(path.string(), cv::IMREAD_COLOR | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
+    cv::Mat3f rgb;
+    bgr.convertTo(rgb, CV_32F, bgr.depth() == CV_8U ? 1 / 255.0 : bgr.depth() == CV_16U ? 1 / 65535.0 : 1.0);
+    cv::cvtColor(rgb, rgb, cv::COLOR_BGR2RGB);
+    return rgb;
+}
+
+void expect_read(const Path& path, const cv::Mat3f& expected) {
     for (const int step : {1, 7, 64, 1000}) {
         const cv::Mat3f rows = read_in_steps(path, step);
         ASSERT_EQ(rows.size(), expected.size());
         EXPECT_LE(cv::norm(rows, expected, cv::NORM_INF), 1e-7) << path << " in steps of " << step;
     }
 }
+
+void expect_as_read_whole(const Path& path) { expect_read(path, read_by_opencv(path)); }
 
 class PictureRowsTest : public testing::Test {
 protected:
@@ -73,7 +91,7 @@ TEST_F(PictureRowsTest, PngOfEveryKindIsAsReadWhole) {
 }
 
 TEST_F(PictureRowsTest, TiffOfEveryKindIsAsReadWhole) {
-    for (const int type : {CV_8UC1, CV_8UC3, CV_16UC1, CV_16UC3, CV_32FC3})
+    for (const int type : {CV_8UC1, CV_8UC3, CV_8UC4, CV_16UC1, CV_16UC3, CV_16UC4, CV_32FC3})
         for (const int compression : {COMPRESSION_NONE, COMPRESSION_LZW, COMPRESSION_ADOBE_DEFLATE})
             expect_as_read_whole(written("a.tif", noisy({97, 131}, type), {cv::IMWRITE_TIFF_COMPRESSION, compression}));
 }
@@ -86,9 +104,88 @@ TEST_F(PictureRowsTest, JpegIsAsReadWhole) {
 
 TEST_F(PictureRowsTest, ExrIsAsReadWhole) {
     write_exr(path("a.exr"), cv::Mat3f(noisy({97, 131}, CV_32FC3)));
-    expect_as_read_whole(path("a.exr"));
+    expect_read(path("a.exr"), read_picture(path("a.exr")).samples);
     write_exr(path("b.exr"), cv::Mat1f(noisy({97, 131}, CV_32FC1)));
-    expect_as_read_whole(path("b.exr"));
+    expect_read(path("b.exr"), read_picture(path("b.exr")).samples);
+}
+
+TEST_F(PictureRowsTest, InterlacedPngIsAsReadWhole) {
+    const cv::Mat3b image = noisy({97, 131}, CV_8UC3);
+    std::FILE* file = std::fopen(path("i.png").c_str(), "wb");
+    png_structp png = ::png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+    png_infop info = ::png_create_info_struct(png);
+    ::png_init_io(png, file);
+    ::png_set_IHDR(png, info, 97, 131, 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_ADAM7, PNG_COMPRESSION_TYPE_DEFAULT,
+                   PNG_FILTER_TYPE_DEFAULT);
+    ::png_write_info(png, info);
+    std::vector<png_bytep> rows;
+    for (int y = 0; y < image.rows; ++y) rows.push_back(const_cast<png_bytep>(image.ptr(y)));
+    ::png_write_image(png, rows.data());
+    ::png_write_end(png, nullptr);
+    ::png_destroy_write_struct(&png, &info);
+    std::fclose(file);
+    cv::Mat3f expected;
+    image.convertTo(expected, CV_32F, 1 / 255.0);
+    expect_read(path("i.png"), expected);
+    cut(path("i.png"));
+    EXPECT_THAT(test::input_error_of([&] { read_in_steps(path("i.png"), 16); }), HasSubstr("i.png"));
+}
+
+TEST_F(PictureRowsTest, InksOfACmykJpegAreColours) {
+    const cv::Vec4b paper[] = {{255, 255, 255, 255}, {0, 255, 255, 255}, {255, 255, 255, 51}, {102, 51, 255, 127}};
+    std::FILE* file = std::fopen(path("k.jpg").c_str(), "wb");
+    jpeg_compress_struct codec;
+    jpeg_error_mgr errors;
+    codec.err = ::jpeg_std_error(&errors);
+    jpeg_create_compress(&codec);
+    ::jpeg_stdio_dest(&codec, file);
+    codec.image_width = 64;
+    codec.image_height = 64;
+    codec.input_components = 4;
+    codec.in_color_space = JCS_CMYK;
+    ::jpeg_set_defaults(&codec);  // with Adobe's marker: what the inks let through
+    ::jpeg_set_quality(&codec, 100, TRUE);
+    ::jpeg_start_compress(&codec, TRUE);
+    for (int y = 0; y < 64; ++y) {
+        std::vector<cv::Vec4b> row(64, paper[y / 16]);
+        JSAMPROW samples = row.front().val;
+        ::jpeg_write_scanlines(&codec, &samples, 1);
+    }
+    ::jpeg_finish_compress(&codec);
+    ::jpeg_destroy_compress(&codec);
+    std::fclose(file);
+    const cv::Mat3f read = read_in_steps(path("k.jpg"), 7);
+    for (int band = 0; band < 4; ++band)
+        for (int c = 0; c < 3; ++c)
+            EXPECT_NEAR(read(16 * band + 8, 30)[c], paper[band][c] * paper[band][3] / (255.0 * 255.0), 2.0 / 255)
+                << band;
+}
+
+TEST_F(PictureRowsTest, PaletteTiffIsColours) {
+    TIFF* tiff = ::TIFFOpen(path("p.tif").c_str(), "w");
+    for (const auto& [tag, value] : {std::pair{TIFFTAG_IMAGEWIDTH, 16},
+                                     {TIFFTAG_IMAGELENGTH, 4},
+                                     {TIFFTAG_BITSPERSAMPLE, 8},
+                                     {TIFFTAG_SAMPLESPERPIXEL, 1},
+                                     {TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_PALETTE},
+                                     {TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG},
+                                     {TIFFTAG_ROWSPERSTRIP, 4}})
+        ::TIFFSetField(tiff, static_cast<ttag_t>(tag), value);
+    std::vector<std::uint16_t> red(256), green(256), blue(256);
+    for (std::size_t i = 0; i < 256; ++i) {
+        red[i] = static_cast<std::uint16_t>(257 * i);
+        green[i] = static_cast<std::uint16_t>(257 * (255 - i));
+        blue[i] = static_cast<std::uint16_t>(257 * ((7 * i) % 256));
+    }
+    ::TIFFSetField(tiff, TIFFTAG_COLORMAP, red.data(), green.data(), blue.data());
+    cv::Mat1b index(4, 16);
+    for (int i = 0; i < 64; ++i) index.data[i] = static_cast<uchar>(4 * i);
+    for (int y = 0; y < 4; ++y) ::TIFFWriteScanline(tiff, index.ptr(y), static_cast<std::uint32_t>(y), 0);
+    ::TIFFClose(tiff);
+    cv::Mat3f expected(4, 16);
+    for (int i = 0; i < 64; ++i)
+        expected(i / 16, i % 16) = cv::Vec3f(cv::Vec3i(4 * i, 255 - 4 * i, 28 * i % 256)) / 255.0F;
+    expect_read(path("p.tif"), expected);
 }
 
 TEST_F(PictureRowsTest, TiledTiffIsPutTogether) {

@@ -158,7 +158,7 @@ TEST_F(ReadPicture, DamageAnywhereIsAPictureOrAnInputError) {
             for (int k = 0; k < 4; ++k)
                 bytes[4 + random(std::min<std::size_t>(bytes.size() - 4, 600))] = std::byte(random(256));
             try {
-                decode_picture(bytes, "damaged");
+                read_picture(file("damaged", bytes));
             } catch (const InputError&) {
                 continue;
             }

@@ -12,14 +12,14 @@ namespace darkbox {
 namespace {
 
 /// Mean over every light, all pixels.
-struct MeanErrors {
+struct Means {
     double thesis, detail, lambert, ptm;
 };
 
-MeanErrors mean_errors_of(const PhotoStack& stack, const Lights& lights) {
+Means mean_errors_of(const PhotoStack& stack, const Lights& lights) {
     const auto held_out = leave_one_light_out(stack, lights, photometric_stereo(stack, lights), every_predictor());
     const auto mean = [&](std::size_t predictor) {
-        return mean_errors(held_out, predictor, LightGroup::every)[0].value().rmse_relative;
+        return mean_errors(held_out, predictor, LightGroup::every).errors[0].value().rmse_relative;
     };
     return {mean(0), mean(1), mean(2), mean(3)};
 }
@@ -32,14 +32,14 @@ TEST(HeldOutScenes, DetailPredictsAPhongSphereBetterThanLambertAndPtm) {
     };
     test::LitSphere sphere(test::spiral_lights(12), phong, 64);
     sphere.add_noise({.read_sigma = 1e-3}, 7);
-    const MeanErrors errors = mean_errors_of(sphere.stack, sphere.lights);
+    const Means errors = mean_errors_of(sphere.stack, sphere.lights);
     EXPECT_LT(errors.detail, 0.95 * errors.lambert);
     EXPECT_LT(errors.detail, 0.95 * errors.ptm);
 }
 
 TEST(HeldOutScenes, DetailPredictsABrickTorusThatShadowsItselfBest) {
     const test::SimulatedStack torus = test::simulated_stack("brick-torus", 12, 112);
-    const MeanErrors errors = mean_errors_of(torus.stack, torus.lights);
+    const Means errors = mean_errors_of(torus.stack, torus.lights);
     EXPECT_LT(errors.detail, errors.thesis);
     EXPECT_LT(errors.detail, errors.lambert);
     EXPECT_LT(errors.detail, errors.ptm);

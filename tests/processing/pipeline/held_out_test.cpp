@@ -144,10 +144,10 @@ TEST(HeldOut, ShadingMapsPredictALambertSphereExactly) {
     const test::TexturedSphere scene = fully_lit_sphere();
     const auto lights = leave_one_light_out(scene.stack, scene.lights, photometric_stereo(scene.stack, scene.lights),
                                             every_predictor());
-    const double detail = mean_errors(lights, 1, LightGroup::every)[all]->rmse_relative;
+    const double detail = mean_errors(lights, 1, LightGroup::every).errors[all]->rmse_relative;
     EXPECT_LT(detail, 1e-4);
-    EXPECT_LT(detail, mean_errors(lights, 0, LightGroup::every)[all]->rmse_relative);
-    EXPECT_LT(detail, mean_errors(lights, 3, LightGroup::every)[all]->rmse_relative);
+    EXPECT_LT(detail, mean_errors(lights, 0, LightGroup::every).errors[all]->rmse_relative);
+    EXPECT_LT(detail, mean_errors(lights, 3, LightGroup::every).errors[all]->rmse_relative);
 }
 
 TEST(HeldOut, ShadowsHighlightsAndClippingAreToldApart) {
@@ -176,9 +176,9 @@ TEST(HeldOut, TheHullIsMadeOfTheOutermostLights) {
     for (std::size_t i = 0; i < 7; ++i) EXPECT_TRUE(lights[i].hull) << i;
     EXPECT_FALSE(lights[7].hull);
     const auto interior = mean_errors(lights, 0, LightGroup::interior);
-    EXPECT_EQ(interior[all]->pixels, lights[7].errors[0][all]->pixels);
-    EXPECT_EQ(mean_errors(lights, 0, LightGroup::every)[all]->pixels,
-              mean_errors(lights, 0, LightGroup::hull)[all]->pixels + interior[all]->pixels);
+    EXPECT_EQ(interior.errors[all]->pixels, lights[7].errors[0][all]->pixels);
+    EXPECT_EQ(mean_errors(lights, 0, LightGroup::every).errors[all]->pixels,
+              mean_errors(lights, 0, LightGroup::hull).errors[all]->pixels + interior.errors[all]->pixels);
 }
 
 TEST(HeldOut, ALightThatTheOthersCannotDoWithoutHasNoErrors) {

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include "processing/formats/atomic_file.h"
+#include "processing/formats/exr.h"
 #include "processing/formats/light_files.h"
 #include "processing/formats/map_files.h"
+#include "processing/formats/picture.h"
 #include "processing/formats/png.h"
 #include "processing/pipeline/export.h"
 #include "processing/pipeline/stack.h"
@@ -186,6 +188,35 @@ TEST_F(Import, RtiFolderWithLpRunsFromEndToEnd) {
     EXPECT_THAT(input_error_of([] { export_format("gif"); }), HasSubstr("'gif'"));
 }
 
+TEST_F(Import, RadianceAboveOneKeepsItsAlbedoThroughDiligent) {
+    test::write_photographs(at("photos"), test::lamp_ring());
+    Lights lights = test::lamp_ring();
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+        const std::string frame = "frame" + std::to_string(i + 1);
+        write_exr(at("bright/" + frame + ".exr"), cv::Mat3f(3 * read_picture(at("photos/" + frame + ".png")).samples));
+        lights[i].file = frame + ".exr";
+    }
+    write_lp(at("bright/ring.lp"), lights);
+    ImportOptions options = plain();
+    options.folders = {at("bright")};
+    const Session session = import_photographs(options);
+    run_calibrate(session);
+    run_normals(session);
+    export_session(session, ExportFormat::diligent, at("diligent"));
+    ImportOptions again;
+    again.folders = {at("diligent")};
+    again.out = at("again");
+    const Session round = import_photographs(again);
+    run_calibrate(round);
+    run_normals(round);
+    const AlbedoMap before = read_albedo_map(session.folder() / "results/albedo.exr");
+    const AlbedoMap after = read_albedo_map(round.folder() / "results/albedo.exr");
+    double most = 0;
+    cv::minMaxLoc(before.albedo.reshape(1), nullptr, &most);
+    EXPECT_GT(most, 1.2);
+    EXPECT_LT(cv::norm(before.albedo, after.albedo, cv::NORM_RELATIVE | cv::NORM_L2), 1e-3);
+}
+
 TEST_F(Import, TextureMapsAreExportedAndTheirErrorsAreClear) {
     test::write_photographs(at("photos"), test::lamp_ring());
     write_lights(at("photos/ring.lp"));
@@ -196,7 +227,9 @@ TEST_F(Import, TextureMapsAreExportedAndTheirErrorsAreClear) {
     export_session(session, export_format("ptm-rgb"), at("rgb.ptm"));
     export_session(session, export_format("relight"), at("web"));
     EXPECT_GT(fs::file_size(at("rgb.ptm")), 96u * 80u * 18u);
+    export_session(session, export_format("relight-rgb"), at("web-rgb"));
     EXPECT_TRUE(fs::exists(at("web/info.json")) && fs::exists(at("web/plane_2.jpg")));
+    EXPECT_TRUE(fs::exists(at("web-rgb/plane_5.jpg")));
     EXPECT_THAT(input_error_of([&] { export_session(session, ExportFormat::ptm, "/proc/none/s.ptm"); }),
                 HasSubstr("/proc/none"));
 }

@@ -22,6 +22,17 @@ using testing::HasSubstr;
 constexpr int texels = 40;
 constexpr int levels = 10;
 
+/// A bowl 20 mm deep under a camera 300 mm away; a hole in it has no height.
+SceneGeometry bowl(cv::Size size) {
+    SceneGeometry geometry{ViewGeometry{0.5, {0.4 * size.width, 0.6 * size.height}, 300}, cv::Mat1f(size)};
+    for (int y = 0; y < size.height; ++y)
+        for (int x = 0; x < size.width; ++x) {
+            const double off_centre = std::hypot(x - 0.5 * size.width, y - 0.5 * size.height);
+            geometry.height_mm(y, x) = x % 17 == 3 ? std::nanf("") : static_cast<float>(20 * off_centre / size.width);
+        }
+    return geometry;
+}
+
 /// Normals of the whole sphere, texels and albedo at random; curves of S that are anything but straight.
 RelightScene random_scene(cv::Size size) {
     std::mt19937 random(7);
@@ -41,6 +52,7 @@ RelightScene random_scene(cv::Size size) {
             scene.shading.radiance(k, i) =
                 i == 0 ? cv::Vec3f(0, 0, 0) : cv::Vec3f(unit(random), unit(random), unit(random));
     }
+    scene.geometry = bowl(size);
     return scene;
 }
 
@@ -66,8 +78,11 @@ cv::Mat3f reference(const RelightScene& scene, const Lights& lights, const Relig
                            cv::Vec3d(scene.shading.mean_albedo(scene.index.label(y, x) - 1, 0)), detail);
             cv::Vec3d sum(0, 0, 0);
             for (const Light& light : lights) {
-                const cv::Vec3d l(light.direction[0], light.direction[1], light.direction[2]);
-                const cv::Vec3d e(light.intensity[0], light.intensity[1], light.intensity[2]);
+                const Incidence at =
+                    light.near ? incidence(light, scene.geometry.point_at(y, x)) : Incidence{light.direction, 1};
+                const cv::Vec3d l(at.direction[0], at.direction[1], at.direction[2]);
+                const cv::Vec3d e(at.falloff * light.intensity[0], at.falloff * light.intensity[1],
+                                  at.falloff * light.intensity[2]);
                 const double cosine = std::max(0.0, n.dot(l));
                 const double mirrored = std::max(0.0, 2 * cosine * n[2] - l[2]);
                 const double gloss = cosine > 0 ? o.phong_specular * std::pow(mirrored, o.phong_exponent) : 0;
@@ -86,6 +101,14 @@ cv::Mat3f reference(const RelightScene& scene, const Lights& lights, const Relig
 
 Light coloured(double x, double y, double z, const Eigen::Vector3d& colour) {
     Light light = light_from(x, y, z);
+    light.intensity = colour;
+    return light;
+}
+
+Light lamp_at(const Eigen::Vector3d& position_mm, const Eigen::Vector3d& colour) {
+    Light light;
+    light.near = LampPosition{position_mm, {5, -3, 0}};
+    light.direction = (position_mm - light.near->object_mm).normalized();
     light.intensity = colour;
     return light;
 }
@@ -117,8 +140,15 @@ std::vector<Setting> settings() {
     split.model = ReflectanceModel::phong_split;
     split.lookup = Lookup::detail;
     split.specular_colour = {0.9, 0.5, 0.2};
-    return {{"lambert", one, lambert}, {"thesis", three, thesis}, {"phong", three, phong},
-            {"narrow", one, narrow},   {"scaled", one, scaled},   {"split", three, split}};
+    const Lights near{lamp_at({-30, 20, 60}, {0.8, 0.7, 0.6}), coloured(1, 0.3, 0.7, {0.1, 0.3, 0.5}),
+                      lamp_at({40, 10, 90}, {0.3, 0.5, 0.6})};
+    RelightOptions near_phong = phong;
+    near_phong.exposure = 0.4;
+    RelightOptions near_split = split;
+    near_split.exposure = 0.4;
+    return {{"near", {near[0]}, lambert}, {"near_phong", near, near_phong}, {"near_split", near, near_split},
+            {"lambert", one, lambert},    {"thesis", three, thesis},        {"phong", three, phong},
+            {"narrow", one, narrow},      {"scaled", one, scaled},          {"split", three, split}};
 }
 
 class RelighterModels : public testing::TestWithParam<Setting> {};
@@ -318,6 +348,33 @@ TEST(Relighter, RefusesABufferOfAnotherSize) {
     EXPECT_THAT(test::input_error_of([&] { relighter.render({light_from(0, 0, 1)}, {}, Encoding::srgb, turned); }),
                 HasSubstr("buffer"));
     EXPECT_THAT(test::input_error_of([&] { relighter.render({light_from(0, 0, 1)}, {}, none); }), HasSubstr("buffer"));
+}
+
+TEST(Relighter, ALampFarAwayIsADistantLight) {
+    RelightScene scene = random_scene({70, 20});
+    scene.geometry = {ViewGeometry{0.1, {35, 10}}, {}};
+    const Relighter relighter(scene);
+    Light far = light_from(0.3, -0.2, 1);
+    cv::Mat3f distant(relighter.size()), near(relighter.size());
+    relighter.render({far}, {}, distant);
+    far.near = LampPosition{1e6 * far.direction};
+    relighter.render({far}, {}, near);
+    EXPECT_LT(largest_difference(near, distant), 1e-3);
+}
+
+TEST(Relighter, RefusesALampThatItCannotPlace) {
+    RelightScene scene = random_scene({30, 20});
+    const Light lamp = lamp_at({0, 0, 50}, {1, 1, 1});
+    Light in_the_object = lamp;
+    in_the_object.near->position_mm = in_the_object.near->object_mm;
+    cv::Mat3f image(scene.index.label.size());
+    EXPECT_THAT(test::input_error_of([&] { Relighter(scene).render({in_the_object}, {}, image); }),
+                HasSubstr("no lamp can stand"));
+    scene.geometry.height_mm = cv::Mat1f(20, 29, 0.0F);
+    EXPECT_THAT(test::input_error_of([&] { Relighter{scene}; }), HasSubstr("height map"));
+    scene.geometry = {};
+    EXPECT_THAT(test::input_error_of([&] { Relighter(scene).render({lamp}, {}, image); }),
+                HasSubstr("where the object's pixels lie"));
 }
 
 }  // namespace

@@ -130,7 +130,7 @@ TEST(Patchmatch, IsBetterThanItsSeeds) {
     const NormalMap target = wavy_normals({128, 128});
     const TransferResult seeds = transfer_texture(source, target, by(TransferMethod::preview));
     const TransferResult refined = transfer_texture(source, target, by(TransferMethod::patchmatch));
-    EXPECT_LT(refined.patch_energy, 0.8 * seeds.patch_energy);
+    EXPECT_LT(refined.patch_energy.value(), 0.8 * seeds.patch_energy.value());
 }
 
 TEST(Patchmatch, UsesMostOfWhatItCouldUse) {
@@ -138,7 +138,7 @@ TEST(Patchmatch, UsesMostOfWhatItCouldUse) {
     const TransferResult result = transfer_texture(source, plane_normals({128, 128}), by(TransferMethod::patchmatch));
     EXPECT_GT(cover(source, result.coordinates), 0.6);
     // Both face the viewer all over: the target's colours should be the source's.
-    EXPECT_LT(result.histogram_distance, 5);
+    EXPECT_LT(result.histogram_distance.value(), 5);
 }
 
 /// A wall on a sphere: courses of bricks of different reds, light joints of two pixels between them.

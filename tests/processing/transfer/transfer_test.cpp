@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "processing/transfer/appearance.h"
+#include "processing/transfer/measures.h"
 #include "processing/transfer/pyramid.h"
 #include "tests/processing/transfer/exemplars.h"
 
@@ -112,6 +114,21 @@ TEST(Transfer, KappaBringsCoherence) {
     }
 }
 
+TEST(Transfer, MeasuresItselfAsAnybodysResultIsMeasured) {
+    TransferSource source = stony_sphere(96);
+    for (const std::optional<float> white : {std::optional<float>(), std::optional<float>(1.0F)}) {
+        source.white = white;
+        const NormalMap target = wavy_normals({96, 80});
+        const TransferResult result = transfer_texture(source, target, by(TransferMethod::patchmatch));
+        const Appearance shown =
+            appearance_of(source.normals, source.albedo, white.value_or(white_level(source.albedo)));
+        const TransferMeasures measures = measure_coordinates(shown, target, result.coordinates, {.stride = 16});
+        EXPECT_EQ(result.patch_energy, measures.patch_energy);
+        EXPECT_EQ(result.histogram_distance, measures.histogram_distance);
+        EXPECT_EQ(result.coherence, measures.coherence);
+    }
+}
+
 TEST(Transfer, DoesNotDependOnExposure) {
     TransferSource source = stony_sphere(48);
     const NormalMap target = wavy_normals({40, 40});
@@ -119,7 +136,7 @@ TEST(Transfer, DoesNotDependOnExposure) {
     source.albedo.albedo *= 0.25;
     const TransferResult dark = transfer_texture(source, target, by(TransferMethod::analogies));
     EXPECT_TRUE(equal(bright.coordinates, dark.coordinates));
-    EXPECT_NEAR(bright.patch_energy, dark.patch_energy, 1e-4);
+    EXPECT_NEAR(bright.patch_energy.value(), dark.patch_energy.value(), 1e-4);
 }
 
 TEST(Transfer, OneColourGivesThatColour) {
@@ -152,7 +169,7 @@ TEST(Transfer, StripesStayStripes) {
         }
     EXPECT_LT(unlike_above, 0.02 * 59 * 64);
     EXPECT_LT(unlike_a_period_before, 0.05 * 59 * 64);
-    EXPECT_LT(result.patch_energy, 1);
+    EXPECT_LT(result.patch_energy.value(), 1);
 }
 
 TEST(Transfer, WorksWithOneSourcePixel) {
@@ -162,6 +179,7 @@ TEST(Transfer, WorksWithOneSourcePixel) {
     const TransferResult result = transfer_texture(source, wavy_normals({20, 12}), by(TransferMethod::analogies));
     for (const cv::Vec2i& at : result.coordinates) EXPECT_EQ(at, cv::Vec2i(7, 8));
     EXPECT_GT(result.coverage_deg, 10);
+    EXPECT_FALSE(result.patch_energy);  // no whole patch to compare with
 }
 
 TEST(Transfer, WorksForTargetsOfAnyShape) {

@@ -52,7 +52,7 @@ TEST(TimestampsThatLie, FrameOfThePreviousLamp) {
         if (call == "light") late = ++lit == 3;
     };
     bench.camera.lie = [&](std::uint64_t) { return milliseconds(late ? 85 : 0); };
-    expect_overcome(bench, "0003_lamp-03: try 1 of 3: the frame shows the picture of lamp 'lamp-02'");
+    expect_overcome(bench, "0003_lamp-03: try 1 of 3");
 }
 
 TEST(TimestampsThatLie, ForEverEndInAnErrorThatNamesTheLamp) {
@@ -72,7 +72,7 @@ TEST(CameraFaults, LostFramesAreNoted) {
 TEST(CameraFaults, EveryFrameMayBeTheDamagedOne) {
     for (const FrameStatus status : {FrameStatus::error, FrameStatus::truncated}) {
         int noted = 0;
-        for (int damaged = 0; damaged < 16; ++damaged) {
+        for (int damaged = 0; damaged < 28; ++damaged) {
             Bench bench;
             bench.camera.tamper = [&](Frame& frame, int number) {
                 if (number == damaged) frame.status = status;
@@ -105,7 +105,7 @@ TEST(CameraFaults, RepeatedPixels) {
         if (lit < 4) slot = frame.pixels;
         if (lit == 4) frame.pixels = slot;
     };
-    expect_overcome(bench, "0004_lamp-04: try 1 of 3: the frame repeats the frame of lamp 'lamp-03' bit for bit");
+    expect_overcome(bench, "0004_lamp-04: try 1 of 3: the camera delivered one picture twice, bit for bit");
 }
 
 TEST(CameraFaults, RepeatedBuffer) {
@@ -146,10 +146,11 @@ TEST(CameraFaults, AHangForEverIsAnErrorWithinItsDeadlines) {
         if (call == "next_frame" && bench.camera.delivered == 5)
             bench.camera.hanging = bench.camera.hangs_for_ever = true;
     };
-    EXPECT_THAT(bench.error<DeviceError>(),
-                AllOf(HasSubstr("lamp 'lamp-0"), HasSubstr("no good frame in 3 tries"), HasSubstr("max_on_s of 2 s")));
+    EXPECT_THAT(bench.error<DeviceError>(), AllOf(HasSubstr("lamp 'lamp-0"), HasSubstr("no good frame in 3 tries"),
+                                                  HasSubstr("delivered nothing")));
     EXPECT_TRUE(bench.lamps.is_dark());
-    EXPECT_LT(to_seconds(bench.clock.now() - begin), 3 * 2.1 + 1);
+    // Once in the light, for as long as the lamp bears; then twice in the dark, for frame_deadline.
+    EXPECT_LT(to_seconds(bench.clock.now() - begin), 2.1 + 2 * 5.1 + 1);
     EXPECT_LE(to_seconds(bench.lamps.longest_on()), bench.rig.lamps[0].max_on.count() + 0.001);
 }
 

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "acquisition/device/device_error.h"
+#include "rig/capture/session_recorder.h"
 #include "tests/rig/capture/bench.h"
 
 namespace darkbox {
@@ -97,7 +98,8 @@ protected:
         SessionWriter writer = SessionWriter::create(bench.folder.path() / "session",
                                                      session_info(bench.rig, info, "a cat", plan_capture(bench.rig)));
         try {
-            run_capture(plan, bench.rig, bench.lamps, bench.camera, bench.clock, writer);
+            SessionRecorder recorder(writer);
+            run_capture(plan, bench.rig, {bench.lamps, bench.camera, bench.clock}, recorder);
         } catch (const InputError& error) {
             EXPECT_EQ(bench.camera.starts, 0) << "refused before hardware is touched";
             return error.what();

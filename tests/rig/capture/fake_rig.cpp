@@ -99,6 +99,7 @@ CameraInfo FakeCamera::configure(const CameraConfig& config) {
     info_.black_level = black;
     info_.frame_period = Seconds(period);
     info_.queue_depth = queue_depth;
+    info_.readout = Seconds(0);
     info_.controls = {config.exposure, config.gain};
     return info_;
 }

@@ -78,8 +78,8 @@ TEST_F(FrameSourceTest, GivesUpAtTheDeadlineAndRecoversOnce) {
     EXPECT_THROW(source.first_after(clock.now(), deadline), DeadlineError);
     EXPECT_GE(clock.now(), deadline);
     EXPECT_LT(clock.now(), deadline + milliseconds(100));
-    source.recover();
-    source.recover();
+    source.recover(std::chrono::seconds(1));
+    source.recover(std::chrono::seconds(1));
     EXPECT_EQ(camera.starts, 2) << "a camera that works is left alone";
     EXPECT_NO_THROW(source.first_after(clock.now(), clock.now() + seconds(1)));
 }

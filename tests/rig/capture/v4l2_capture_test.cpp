@@ -122,6 +122,7 @@ TEST_F(V4l2Capture, UnpluggedWhileItStreamsTheShotIsRepeatedAndTheSessionSaysSo)
     // Somebody plugs it in again while the run waits.
     time.passed = [&](TimePoint now) {
         if (kernel.plugged() || now < unplugged + milliseconds(700)) return;
+        EXPECT_FALSE(lamps.lit) << "a lost camera is waited for in the dark";
         kernel.plug_in();
     };
     const auto [session, summary] = capture();

@@ -36,5 +36,16 @@ TEST(ParseBall, IsTrustedFully) {
     EXPECT_EQ(ball.confidence, 1.0);
 }
 
+TEST(InOptions, FieldsAreCalledByTheOptionsThatWereGiven) {
+    EXPECT_EQ(in_options("memory_mib is 0", {"solver", "memory-mib"}), "--memory-mib is 0");
+    EXPECT_EQ(in_options("normal_sigma is -1", {"sigma"}), "--sigma is -1");
+    EXPECT_EQ(in_options("shading: levels is 1, allowed are 2...256", {"levels"}),
+              "--levels is 1, allowed are 2...256");
+    EXPECT_EQ(in_options("ball_diameter_mm is 0", {"ball-diameter"}), "--ball-diameter is 0");
+    EXPECT_EQ(in_options("memory_mib is 0", {"solver"}), "memory_mib is 0");
+    EXPECT_EQ(in_options("s/results/normals.exr is not there yet", {"out"}), "s/results/normals.exr is not there yet");
+    EXPECT_EQ(in_options(" is ", {"out"}), " is ");
+}
+
 }  // namespace
 }  // namespace darkbox

@@ -62,8 +62,8 @@ std::string BadInput::session() {
     return path("session").string();
 }
 
-void BadInput::expect_one_error(const ProgramResult& r, const std::string& names) {
-    EXPECT_EQ(r.status, 1) << r.err;
+void BadInput::expect_one_error(const ProgramResult& r, const std::string& names, int status) {
+    EXPECT_EQ(r.status, status) << r.err;
     EXPECT_THAT(r.err, testing::HasSubstr("error: "));
     EXPECT_EQ(r.err.find("error: "), r.err.rfind("error: ")) << r.err;
     EXPECT_THAT(r.err, testing::HasSubstr(names));

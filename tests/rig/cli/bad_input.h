@@ -45,8 +45,8 @@ protected:
     /// A sealed session of a good capture with given lights.
     std::string session();
 
-    /// Status 1, one "error: " that names this, nothing on stdout.
-    static void expect_one_error(const ProgramResult& r, const std::string& names);
+    /// Status 1 (2 for wrong usage), one "error: " that names this, nothing on stdout.
+    static void expect_one_error(const ProgramResult& r, const std::string& names, int status = 1);
 
     TemporaryFolder folder_;
 };

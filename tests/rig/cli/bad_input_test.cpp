@@ -77,8 +77,10 @@ TEST_F(BadInput, BallWithoutAHighlightInOneFrame) {
         darkbox_program({"import", photographs("photos", good_lights), "--ball-images", path("ball").string(), "--ball",
                          "48,48,40", "--transfer", "linear", "--out", path("s").string()});
     ASSERT_EQ(imported.status, 0) << imported.err;
-    expect_one_error(darkbox_program({"calibrate", path("s").string()}), "p2.png");
-    EXPECT_EQ(darkbox_program({"calibrate", path("s").string(), "--drop", "p2.png"}).status, 0);
+    const auto left_out = darkbox_program({"calibrate", path("s").string(), "--strict"});
+    EXPECT_EQ(left_out.status, 3);
+    EXPECT_THAT(left_out.err, HasSubstr("p2.png has no usable highlight"));
+    EXPECT_EQ(darkbox_program({"calibrate", path("s").string(), "--drop", "p2.png", "--strict"}).status, 0);
 }
 
 TEST_F(BadInput, ChecksumThatDoesNotFit) {
@@ -143,11 +145,11 @@ TEST_F(BadInput, MalformedLightIsRefusedBeforeAnyWork) {
     const std::string s = session();
     ASSERT_EQ(darkbox_program({"process", s}).status, 0);
     expect_one_error(darkbox_program({"relight", s, "--light", "1,2", "--out", path("x.png").string()}),
-                     "--light '1,2'");
-    expect_one_error(darkbox_program({"relight", s, "--out", path("x.png").string()}), "--light");
+                     "--light '1,2'", 2);
+    expect_one_error(darkbox_program({"relight", s, "--out", path("x.png").string()}), "--light", 2);
     expect_one_error(
         darkbox_program({"relight", s, "--sequence", "turn", "--light", "0,0,1", "--out", path("x").string()}),
-        "--environment");
+        "--environment", 2);
     expect_one_error(darkbox_program({"relight", s, "--light", "0,0,1", "--out", path("x.mp4").string()}), "ffmpeg");
     EXPECT_FALSE(fs::exists(path("x.png")));
 }

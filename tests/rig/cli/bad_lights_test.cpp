@@ -104,5 +104,50 @@ TEST_F(BadLights, ThousandLightsGiveOneAnswer) {
     EXPECT_EQ(lp.status, 0) << lp.err;
 }
 
+TEST_F(BadLights, OptionsThatWouldHaveNoEffectAreRefused) {
+    const std::string s = session();
+    expect_one_error(darkbox_program({"calibrate", s, "--photometric"}), "--photometric would have no effect");
+    expect_one_error(darkbox_program({"calibrate", s, "--highlight", "nosuch.png=3,3"}), "--highlight");
+    expect_one_error(darkbox_program({"calibrate", s, "--lamps", "near", "--method", "brightest"}),
+                     "--lamps, --method");
+    expect_one_error(darkbox_program({"calibrate", s, "--any-rig"}), "--any-rig");
+    ASSERT_EQ(darkbox_program({"calibrate", s}).status, 0);
+    expect_one_error(darkbox_program({"calibrate", s, "--from", s, "--ball", "3,3,4"}), "--ball");
+}
+
+TEST_F(BadLights, LightsOfOtherLamps) {
+    const std::string s = session();
+    ASSERT_EQ(darkbox_program({"calibrate", s}).status, 0);
+    EXPECT_EQ(darkbox_program({"calibrate", s, "--from", s}).status, 0);
+    const auto store = [&](const std::string& name, std::size_t lights) {
+        auto json = nlohmann::json::parse(std::ifstream(std::filesystem::path(s) / "calibration/lights.json"));
+        auto& all = json["lights"];
+        while (all.size() < lights) all.push_back(all.front());
+        for (std::size_t i = 0; i < all.size(); ++i) all[i]["lamp"] = fmt::format("other{}.png", i);
+        std::ofstream(path(name)) << json;
+        return path(name).string();
+    };
+    const std::string same_count = store("four.json", 4), more = store("six.json", 6);
+    expect_one_error(darkbox_program({"calibrate", s, "--from", same_count}), "--any-rig");
+    EXPECT_EQ(darkbox_program({"calibrate", s, "--from", same_count, "--any-rig"}).status, 0);
+    expect_one_error(darkbox_program({"calibrate", s, "--from", more, "--any-rig"}), "6 lights for 4 frames");
+}
+
+TEST_F(BadLights, WrongUsageHasAStatusOfItsOwn) {
+    const std::string s = session();
+    for (const std::vector<std::string>& wrong : std::vector<std::vector<std::string>>{
+             {"calibrate", s, "--ball", "1,2"},
+             {"export", s, "--format", "foo", "--out", path("x").string()},
+             {"relight", s, "--out", path("x.png").string()},
+             {"transfer", "--target", s, "--out", path("x").string()},
+             {"transfer", "--source", s, "--source-normals", "n.exr", "--target", s, "--out", path("x").string()}})
+        EXPECT_EQ(darkbox_program(wrong).status, 2) << wrong.front();
+    const auto solver = darkbox_program({"normals", s, "--solver", "foo"});
+    EXPECT_EQ(solver.status, 2);
+    EXPECT_THAT(solver.err, HasSubstr("--solver: 'foo' is none of: lsq, robust"));
+    expect_one_error(darkbox_program({"normals", s, "--memory-mib", "0"}), "--memory-mib is 0");
+    expect_one_error(darkbox_program({"evaluate", s, "--no-held-out"}), "");
+}
+
 }  // namespace
 }  // namespace darkbox::test

@@ -93,10 +93,10 @@ TEST_F(BadPhotographs, EnormousAndNegativeValuesDoNotBreakTheRest) {
 
 TEST_F(BadPhotographs, AFrameThatIsBlackAllOver) {
     const std::string s = session_with([](cv::Mat1b& image) { image = 0; });
-    const auto r = darkbox_program({"process", s});
-    EXPECT_EQ(r.status, 0) << r.err;
-    EXPECT_THAT(r.err, HasSubstr("p2.png"));
-    EXPECT_THAT(r.err, HasSubstr("black"));
+    const auto r = darkbox_program({"process", s, "--strict", "--json"});
+    EXPECT_EQ(r.status, 3) << r.err;
+    EXPECT_THAT(r.err, HasSubstr("p2.png is black wherever the object is, and was left out"));
+    EXPECT_EQ(nlohmann::json::parse(r.out)["normals"]["images"], 3);
     ASSERT_EQ(darkbox_program({"calibrate", s, "--drop", "p2.png"}).status, 0);
     EXPECT_EQ(darkbox_program({"normals", s}).err, "");
     expect_one_error(darkbox_program({"calibrate", s, "--drop", "p7.png"}), "p7.png");
@@ -118,18 +118,44 @@ TEST_F(BadPhotographs, AFrameThatIsClippedAllOver) {
     EXPECT_THAT(r.err, HasSubstr("clipped"));
 }
 
-TEST_F(BadPhotographs, ABlackFrameOfTheBall) {
-    const std::string s = ball_session("48,48,40", [](cv::Mat1b& image, std::size_t i) {
-        if (i == 1) image = 0;
-    });
-    expect_one_error(darkbox_program({"calibrate", s}), "p1.png");
+TEST_F(BadPhotographs, EveryFrameClipped) {
+    std::filesystem::create_directories(path("photos"));
+    cv::imwrite(path("mask.png").string(), matte_ball(good_lights[3]) > 0);
+    for (int i = 0; i < 4; ++i)
+        cv::imwrite((path("photos") / fmt::format("p{}.png", i)).string(), cv::Mat1b(side, side, uchar{255}));
+    ASSERT_EQ(darkbox_program({"import", path("photos").string(), "--lights", lights_file(good_lights), "--mask",
+                               path("mask.png").string(), "--transfer", "linear", "--out", path("s").string()})
+                  .status,
+              0);
+    for (const char* solver : {"lsq", "robust"})
+        expect_one_error(darkbox_program({"process", path("s").string(), "--solver", solver}), "clipped");
 }
 
-TEST_F(BadPhotographs, AClippedFrameOfTheBall) {
+TEST_F(BadPhotographs, TooFewFramesThatAreNotBlack) {
+    const std::string photos = photographs("photos", good_lights);
+    for (const char* black : {"photos/p1.png", "photos/p2.png"})
+        cv::imwrite(path(black).string(), cv::Mat1b(side, side, uchar{0}));
+    ASSERT_EQ(import(photos, good_lights).status, 0);
+    expect_one_error(darkbox_program({"process", path("s").string()}), "black");
+}
+
+TEST_F(BadPhotographs, AFrameWhoseBallShowsNothingIsLeftOut) {
+    for (const uchar value : {uchar{0}, uchar{255}}) {
+        std::filesystem::remove_all(path("s"));
+        const std::string s = ball_session("48,48,40", [value](cv::Mat1b& image, std::size_t i) {
+            if (i == 1) image = value;
+        });
+        const auto r = darkbox_program({"calibrate", s, "--strict"});
+        EXPECT_EQ(r.status, 3) << r.err;
+        EXPECT_THAT(r.err, HasSubstr("p1.png has no usable highlight"));
+    }
+}
+
+TEST_F(BadPhotographs, ABallThatShowsTooFewLamps) {
     const std::string s = ball_session("48,48,40", [](cv::Mat1b& image, std::size_t i) {
-        if (i == 1) image = 255;
+        if (i > 1) image = 0;
     });
-    expect_one_error(darkbox_program({"calibrate", s}), "p1.png");
+    expect_one_error(darkbox_program({"calibrate", s}), "p2.png, p3.png");
 }
 
 TEST_F(BadPhotographs, ABallOutsideThePicture) {
@@ -140,8 +166,10 @@ TEST_F(BadPhotographs, ABallOutsideThePicture) {
 
 TEST_F(BadPhotographs, ABallOfNoSize) {
     const std::string s = ball_session("", [](cv::Mat1b&, std::size_t) {});
-    for (const char* ball : {"--ball=48,48,0", "--ball=48,48,-3", "--ball=48,48,nan", "--ball=48,48"})
+    for (const char* ball : {"--ball=48,48,0", "--ball=48,48,-3"})
         expect_one_error(darkbox_program({"calibrate", s, ball}), "ball");
+    for (const char* ball : {"--ball=48,48,nan", "--ball=48,48"})
+        expect_one_error(darkbox_program({"calibrate", s, ball}), "ball", 2);
 }
 
 TEST_F(BadPhotographs, OnePixel) {

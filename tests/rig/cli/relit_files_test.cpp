@@ -66,5 +66,19 @@ TEST(RenderToFile, WritesWhatTheEndingSays) {
     EXPECT_TRUE(fs::exists(written("new/folder/picture.jpg", 8)));
 }
 
+TEST(GainUnder, ProbesOfAnyUnitFillTheRange) {
+    const RelightScene scene = red_pixel();
+    const Relighter relighter(scene);
+    for (const float unit : {0.01F, 1.0F, 300.0F}) {
+        RelightOptions options;
+        const FoldedEnvironment sky = relighter.fold({cv::Mat3f(8, 16, cv::Vec3f(unit, unit, unit))}, options);
+        options.exposure = 7;  // counts on top
+        options.exposure = gain_under(sky, relighter, options, scene.normals.valid, {});
+        cv::Mat3f image(1, 1);
+        relighter.render(sky, options, image);
+        EXPECT_NEAR(image(0, 0)[0], 1, 1e-4) << unit;
+    }
+}
+
 }  // namespace
 }  // namespace darkbox

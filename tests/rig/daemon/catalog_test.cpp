@@ -72,7 +72,9 @@ protected:
 
 TEST_F(CatalogTest, KnowsWhatLiesOnDisk) {
     seal("cup");
-    { const SessionWriter left = begin("vase", "2026-02-02T00:00:00.000Z"); }
+    {
+        const SessionWriter left = begin("vase", "2026-02-02T00:00:00.000Z");
+    }
     fs::create_directory(folder_.path() / "torn");
     std::ofstream(folder_.path() / "torn" / "journal.jsonl") << "nonsense\n";
     fs::create_directory(folder_.path() / "no-session");
@@ -140,7 +142,8 @@ TEST_F(CatalogTest, ComparesEveryCalibrationWithTheLastAndTheFirst) {
     EXPECT_EQ(catalog.calibrations({.after = "run-1", .limit = 1})[0].session, "run-2");
 
     EXPECT_THAT(catalog.drifts("run-0"), IsEmpty());
-    const auto check = [&](const std::string& session, const std::string& role, const std::string& against, bool steady) {
+    const auto check = [&](const std::string& session, const std::string& role, const std::string& against,
+                           bool steady) {
         for (const CatalogDrift& drift : catalog.drifts(session)) {
             if (drift.role != role) continue;
             EXPECT_EQ(drift.against, against) << session;
@@ -185,7 +188,9 @@ TEST_F(CatalogTest, IsTheSameOnceRebuilt) {
 
 TEST_F(CatalogTest, IsMadeAnewWhereItIsDamaged) {
     seal("cup");
-    { Catalog(folder_.path()).refresh(); }
+    {
+        Catalog(folder_.path()).refresh();
+    }
     const fs::path file = folder_.path() / ".darkbox" / "catalog.sqlite";
     for (const std::string& damage : {std::string(100, 'x'), std::string(200'000, '\xa5')}) {
         std::ofstream(file, std::ios::in | std::ios::out) << damage;
@@ -198,7 +203,9 @@ TEST_F(CatalogTest, IsMadeAnewWhereItIsDamaged) {
 }
 
 TEST_F(CatalogTest, RefusesOneOfANewerDarkbox) {
-    { const Catalog made(folder_.path()); }
+    {
+        const Catalog made(folder_.path());
+    }
     const std::string file = folder_.path() / ".darkbox" / "catalog.sqlite";
     SQLite::Database(file, SQLite::OPEN_READWRITE).exec("PRAGMA user_version = 99");
     EXPECT_THROW(Catalog(folder_.path()), InputError);

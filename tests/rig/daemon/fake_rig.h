@@ -42,6 +42,7 @@ public:
         return {.session = request.folder, .frames = 5, .resumed = 1, .repeated = 2, .duration = Seconds(0.5)};
     }
 
+    void lend(const std::function<void(const CaptureDevices&)>&) override {}
     void dark() override {
         if (script_.dark_fails) throw DeviceError("lamp board: no answer", "check its cable");
         script_.lit = false;

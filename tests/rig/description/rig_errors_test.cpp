@@ -209,6 +209,41 @@ INSTANTIATE_TEST_SUITE_P(
         BadRig{"driver", with("[lamps]\ndriver = \"sim\"", "[lamps.gpio]\nchip = \"c\"\n[lamps]\ndriver = \"sim\""),
                "has [lamps.gpio], but driver \"sim\""}));
 
+/// One lamp on the USB lamp controller.
+std::string usb_rig(const std::string& usb, const std::string& lamp = "") {
+    return "[rig]\nname = \"bench\"\n[camera]\ndriver = \"v4l2\"\ndevice = \"/dev/video0\"\n[lamps]\n"
+           "driver = \"usb\"\n[lamps.usb]\n" +
+           usb + "\n[[lamps.lamp]]\nname = \"a\"\nchannel = 7\nposition_mm = [0, 0, 900]\n" + lamp + "\n";
+}
+
+TEST(UsbRig, ReadsSerialHeartbeatAndDuty) {
+    const RigDescription rig =
+        parse_rig(usb_rig("serial = \"LC-1\"\nheartbeat_ms = 100", "max_duty = 0.2"), "rig.toml");
+    EXPECT_EQ(rig.usb.serial, "LC-1");
+    EXPECT_DOUBLE_EQ(rig.usb.heartbeat.count(), 0.1);
+    EXPECT_DOUBLE_EQ(rig.lamps[0].max_duty, 0.2);
+    const RigDescription plain = parse_rig(usb_rig(""), "rig.toml");
+    EXPECT_EQ(plain.usb.serial, "");
+    EXPECT_DOUBLE_EQ(plain.usb.heartbeat.count(), 1.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Usb, RigErrors,
+    testing::Values(
+        BadRig{"heartbeat", usb_rig("heartbeat_ms = 40"), "heartbeat_ms is 40; allowed: 50 to 1000"},
+        BadRig{"serial", usb_rig("serial = \"LC-0123456789\""), "serial has 13 characters; allowed: up to 12"},
+        BadRig{"unknown", usb_rig("seriel = \"LC-1\""), "did you mean 'serial'?"},
+        BadRig{"too_long", usb_rig("", "max_on_s = 61"), "max_on_s is 61; allowed with driver \"usb\": up to 60"},
+        BadRig{"duty", usb_rig("", "max_duty = 0.9"), "max_duty is 0.9; allowed: 0.02 to 0.79"},
+        BadRig{"duty_of_gpio", gpio_rig("chip = \"c\"", "line = 4\nmax_duty = 0.5"),
+               "max_duty does not belong to driver \"gpio\""},
+        BadRig{"usb_of_sim", with("[lamps]\ndriver = \"sim\"", "[lamps.usb]\n[lamps]\ndriver = \"sim\""),
+               "has [lamps.usb], but driver \"sim\""},
+        BadRig{"seen_without_time", with("width = 320", "width = 320\nlamps_seen = \"f\""),
+               "has lamps_seen without real_time"},
+        BadRig{"seen_of_sim", with("width = 320", "width = 320\nlamps_seen = \"f\"\nreal_time = true"),
+               "has lamps_seen, but \"sim\" lamps"}));
+
 INSTANTIATE_TEST_SUITE_P(
     DoNotFit, RigErrors,
     testing::Values(BadRig{"same_name", with("name = \"b\"", "name = \"a\""),

@@ -1,0 +1,309 @@
+#include "rig/capture/predictive_shots.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "acquisition/device/device_error.h"
+
+namespace darkbox {
+namespace {
+
+/// How finely a witness can be heard, in shares of an exposure.
+constexpr double witness_blur = 0.02;
+/// Frames held until their block is proven.
+constexpr std::size_t held_bytes = std::size_t{256} << 20;
+constexpr std::size_t longest_block = 64;
+constexpr std::size_t shortest_block = 4;
+/// Before a switch this much time is left alone: fetching a frame could take longer.
+constexpr Nanoseconds longest_guard = std::chrono::milliseconds(3);
+/// What a call to the lamps is expected to take at most; one that takes longer costs a frame.
+constexpr std::uint64_t spare_frames = 16;
+constexpr Nanoseconds switching_time = std::chrono::microseconds(50);
+
+double ms(Nanoseconds d) { return to_seconds(d) * 1000.0; }
+
+}  // namespace
+
+Unproven PredictiveShots::take(std::span<const Shot> shots, const ShotSink& proven) {
+    shots_ = shots;
+    proven_ = &proven;
+    pending_.clear();
+    witnesses_.clear();
+    repeats_.clear();
+    block_ = 0;
+    unproven_ = {};
+    const auto give_up = [&](const std::string& reason) {
+        unproven_.stay_settled = true;
+        leave(0, shots_.size(), reason);
+        return unproven_;
+    };
+    if (!source_.info().readout)
+        return give_up("the camera's read-out is not known: darkbox rig measure-latency measures it");
+    if (!source_.find_rhythm(clock_.now() + 32 * source_.rhythm().period() +
+                             to_nanoseconds(rig_.capture.frame_deadline)))
+        return give_up("the camera's timestamps keep no rhythm");
+    if (!budget().fits()) return give_up("the gap between exposures is too short: " + budget().words());
+    if (!probe_share())
+        return give_up("the exposure is too short beside the lamps' settling and the jitter: " + budget().words());
+    if (!lamps_bear_it()) return give_up("a lamp's max_on_s is shorter than three frames");
+    try {
+        run();
+    } catch (const DeviceError& error) {
+        lamps_.dark();
+        settle_blocks(false);
+        const std::size_t settled = block_ == 0 ? 0 : *witnesses_[block_].before + 1;
+        leave(settled, shots_.size(), error.what());
+        return unproven_;
+    }
+    settle_blocks(true);
+    return unproven_;
+}
+
+bool PredictiveShots::lamps_bear_it() const {
+    return std::all_of(shots_.begin(), shots_.end(), [&](const Shot& shot) {
+        return 3 * source_.rhythm().period() <= to_nanoseconds(rig_.lamps.at(shot.lamp->value).max_on);
+    });
+}
+
+GapBudget PredictiveShots::budget() const {
+    const ExposureClock& rhythm = source_.rhythm();
+    GapBudget budget = gap_budget(rhythm, rig_, shots_);
+    budget.switching = switching_time;
+    budget.margin = 2 * rhythm.margin() + to_nanoseconds(witness_blur * source_.info().controls.exposure);
+    return budget;
+}
+
+std::size_t PredictiveShots::shots_in_a_block() const {
+    const CameraInfo& info = source_.info();
+    const std::size_t bytes = static_cast<std::size_t>(info.width) * static_cast<std::size_t>(info.height) *
+                              static_cast<std::size_t>(channels(info.format) * bytes_per_sample(info.format));
+    return std::clamp(held_bytes / std::max<std::size_t>(bytes, 1), shortest_block, longest_block);
+}
+
+void PredictiveShots::run() {
+    const std::size_t block = shots_in_a_block();
+    seen_ = source_.rhythm().first_from(clock_.now());
+    probe(std::nullopt, 0);
+    for (std::size_t shot = 1; shot < shots_.size(); ++shot) {
+        if (shot % block == 0)
+            probe(shot - 1, shot);
+        else
+            light(shot, gap_after(last_frame_));
+        expect_frames();
+        settle_blocks(false);
+    }
+    probe(shots_.size() - 1, std::nullopt);
+    await(witnesses_.back().sequence);
+}
+
+/// The lamps are not to be driven on while the camera hangs.
+void PredictiveShots::expect_frames() const {
+    const auto patience = static_cast<std::uint64_t>(source_.info().queue_depth) + spare_frames;
+    if (source_.rhythm().first_from(clock_.now()) > seen_ + patience)
+        throw DeadlineError("the camera stopped delivering frames", "check the camera's cable and the load on its bus");
+}
+
+/// The middle of what the gap leaves when the lamp has settled.
+TimePoint PredictiveShots::gap_after(std::uint64_t sequence) const {
+    const Interval before = source_.rhythm().predicted(sequence);
+    const Interval after = source_.rhythm().predicted(sequence + 1);
+    return before.end + std::max(Nanoseconds(0), after.begin - before.end - budget().settle - switching_time) / 2;
+}
+
+void PredictiveShots::light(std::size_t shot, TimePoint moment) {
+    pump_until(moment);
+    const ExposureClock& rhythm = source_.rhythm();
+    if (!pending_.empty()) pending_.back().off = clock_.now();
+    lamps_.light(*shots_[shot].lamp);
+    Pending pending;
+    pending.on = clock_.now();
+    pending.first = rhythm.first_from(lamps_.timeline().steady_from() + rhythm.margin());
+    last_frame_ = pending.first + (check_.knows_noise() || shot > 0 ? 0 : 1);
+    pending_.push_back(std::move(pending));
+}
+
+WitnessTolerance PredictiveShots::tolerance() const {
+    const double exposure = source_.info().controls.exposure.count();
+    const double stamps = witness_blur + to_seconds(source_.rhythm().margin()) / exposure;
+    return {stamps + to_seconds(budget().settle) / exposure, stamps};
+}
+
+/// The share of an exposure that a probe leaves to the lamp of after, so that the spoiled frame tells as much as it can
+/// of stamps that are off either way; none where it could not tell.
+std::optional<double> PredictiveShots::probe_share() const {
+    constexpr double telling = 1.4;
+    const WitnessTolerance most = tolerance();
+    if (telling * (most.late + most.early) >= 1) return std::nullopt;
+    return (1 + telling * (most.late - most.early)) / 2;
+}
+
+/// Switches in the middle of an exposure.
+void PredictiveShots::probe(std::optional<std::size_t> before, std::optional<std::size_t> after) {
+    const ExposureClock& rhythm = source_.rhythm();
+    Witness witness;
+    witness.before = before;
+    witness.after = after;
+    witness.sequence = std::max(rhythm.first_from(clock_.now() + longest_guard), before ? last_frame_ + 1 : 0);
+    const TimePoint moment = rhythm.predicted(witness.sequence).begin +
+                             to_nanoseconds(*source_.info().readout / 2 +
+                                            (1 - probe_share().value_or(0.5)) * source_.info().controls.exposure);
+    witnesses_.push_back(std::move(witness));
+    if (after) return light(*after, moment);
+    pump_until(moment);
+    pending_.back().off = clock_.now();
+    lamps_.dark();
+}
+
+void PredictiveShots::pump_until(TimePoint moment) {
+    const TimePoint stop = moment - std::min(longest_guard, source_.rhythm().period() / 8);
+    while (clock_.now() < stop) {
+        try {
+            auto frame = source_.next_until(stop);
+            if (!frame) break;
+            file(std::move(*frame));
+        } catch (const DamagedFrame& error) {
+            unproven_.reasons.emplace_back(error.what());
+        }
+    }
+    clock_.sleep_until(moment);
+}
+
+void PredictiveShots::await(std::uint64_t sequence) {
+    const CameraInfo& info = source_.info();
+    const TimePoint deadline =
+        clock_.now() + source_.rhythm().period() * (info.queue_depth + 8) + to_nanoseconds(rig_.capture.frame_deadline);
+    while (seen_ < sequence) {
+        try {
+            auto frame = source_.next_until(deadline);
+            if (!frame)
+                throw DeadlineError("no frame came after the last lamp",
+                                    "check the camera, or raise frame_deadline_s of [capture]");
+            file(std::move(*frame));
+        } catch (const DamagedFrame& error) {
+            unproven_.reasons.emplace_back(error.what());
+        }
+    }
+}
+
+void PredictiveShots::file(Frame frame) {
+    seen_ = std::max(seen_, frame.sequence);
+    if (const auto repeated = source_.repeated())
+        repeats_.push_back({frame.sequence, fmt::format("frame {} repeats the picture of frame {} bit for bit",
+                                                        frame.sequence, *repeated)});
+    for (Witness& witness : witnesses_)
+        if (witness.sequence == frame.sequence && source_.in_rhythm()) {
+            witness.frame = std::move(frame);
+            return;
+        }
+    if (!source_.in_rhythm()) return;
+    const Interval exposure = source_.rhythm().predicted(frame.sequence);
+    const auto light = lamps_.timeline().sole_light(exposure, source_.rhythm().margin());
+    if (!light || !light->lamp) return;
+    const auto next = std::upper_bound(pending_.begin(), pending_.end(), frame.sequence,
+                                       [](std::uint64_t s, const Pending& p) { return s < p.first; });
+    if (next == pending_.begin()) return;
+    Pending& pending = *std::prev(next);
+    const auto shot = static_cast<std::size_t>(std::prev(next) - pending_.begin());
+    if (light->lamp != shots_[shot].lamp) return;
+    if (!pending.frame)
+        pending.frame = std::move(frame);
+    else if (!pending.confirming && shot == 0)
+        pending.confirming = std::move(frame);
+}
+
+/// Blocks whose closing witness is there are proven or left. `all`: no frame comes any more.
+void PredictiveShots::settle_blocks(bool all) {
+    while (block_ + 1 < witnesses_.size()) {
+        Witness& opening = witnesses_[block_];
+        Witness& closing = witnesses_[block_ + 1];
+        const bool complete = closing.after ? pending_[*closing.after].frame.has_value() : closing.frame.has_value();
+        if (!complete && !all) return;
+        const std::size_t first = *opening.after, last = *closing.before + 1;
+        const PictureCheck before = check_;
+        const std::string doubt = verify(first, last, opening, closing);
+        if (!doubt.empty()) {
+            check_ = before;
+            leave(first, last, doubt);
+        }
+        for (std::size_t i = first; i < last; ++i) pending_[i].confirming.reset();
+        ++block_;
+    }
+}
+
+void PredictiveShots::leave(std::size_t first, std::size_t last, const std::string& reason) {
+    unproven_.shots.insert(unproven_.shots.end(), shots_.begin() + static_cast<std::ptrdiff_t>(first),
+                           shots_.begin() + static_cast<std::ptrdiff_t>(last));
+    if (std::find(unproven_.reasons.begin(), unproven_.reasons.end(), reason) == unproven_.reasons.end())
+        unproven_.reasons.push_back(reason);
+}
+
+/// Why the block's frames cannot be believed; empty when they can, and then they are handed on.
+std::string PredictiveShots::verify(std::size_t first, std::size_t last, Witness& opening, Witness& closing) {
+    std::vector<std::string> found(last - first);
+    for (const Repeat& repeat : repeats_)
+        if (repeat.sequence >= opening.sequence && repeat.sequence <= closing.sequence)
+            return *(closing.doubt = repeat.words);
+    try {
+        for (std::size_t i = first; i < last; ++i) {
+            const Pending& pending = pending_[i];
+            if (!pending.frame) continue;
+            if (!check_.knows_noise() && !pending.confirming)
+                return fmt::format("lamp '{}': no second frame to learn the noise from", name_of(i));
+            found[i - first] =
+                check_.accept_lit(name_of(i), *pending.frame, pending.confirming ? &*pending.confirming : nullptr);
+        }
+    } catch (const InputError& error) {
+        closing.doubt = error.what();
+        return error.what();
+    }
+    for (Witness* witness : {&opening, &closing}) {
+        if (!witness->doubt) witness->doubt = heard(*witness);
+        if (!witness->doubt->empty()) return *witness->doubt;
+    }
+    for (std::size_t i = first; i < last; ++i) {
+        if (pending_[i].frame)
+            hand_on(i, found[i - first]);
+        else
+            leave(i, i + 1, fmt::format("lamp '{}': its frame was lost", name_of(i)));
+    }
+    return "";
+}
+
+void PredictiveShots::hand_on(std::size_t shot, const std::string& found) {
+    Pending& pending = pending_[shot];
+    const double after = ms(pending.frame->exposure.begin - pending.on);
+    (*proven_)(shots_[shot],
+               {std::move(*pending.frame), pending.on, pending.off,
+                fmt::format("exposed {:.1f} ms after the switch, which fell into the gap; {}", after, found)});
+    pending.frame.reset();
+}
+
+/// Why the witness does not bear out the timestamps; empty when it does.
+std::string PredictiveShots::heard(const Witness& witness) const {
+    const std::string who = fmt::format("frame {}, during which the lamps were switched,", witness.sequence);
+    if (!witness.frame) return who + " was lost";
+    const Frame* after = nullptr;
+    if (witness.after) {
+        if (!pending_[*witness.after].frame) return who + " has no frame after it to compare with";
+        after = &*pending_[*witness.after].frame;
+    }
+    const Seconds exposure = source_.info().controls.exposure;
+    const Interval span = source_.rhythm().predicted(witness.sequence);
+    const auto expected = [&](double height) {
+        const TimePoint begin = span.begin + to_nanoseconds(height * *source_.info().readout);
+        const Interval row{begin, begin + to_nanoseconds(exposure)};
+        const auto share = [&](std::optional<std::size_t> shot) {
+            return shot ? lamps_.timeline().share(*shots_[*shot].lamp, row) : 0.0;
+        };
+        return LightShares{share(witness.before), share(witness.after)};
+    };
+    const std::optional<std::string> before = witness.before ? std::optional(name_of(*witness.before)) : std::nullopt;
+    const auto report = check_.hear(before, *witness.frame, after, expected, tolerance());
+    if (!report || !report->informative) return who + " shows too little of both lights to tell when it was exposed";
+    if (report->agrees) return "";
+    return fmt::format("{} was exposed {:.2f} ms from where its timestamp says", who,
+                       1000.0 * exposure.count() * std::max(report->latest, report->earliest));
+}
+
+}  // namespace darkbox
