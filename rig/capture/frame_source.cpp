@@ -118,7 +118,7 @@ void FrameSource::check_order(const Frame& frame, const Place& before) const {
 void FrameSource::check_present(const Frame& frame) const {
     const TimePoint now = clock_.now();
     if (frame.exposure.end < frame.exposure.begin || frame.timestamp > now ||
-        frame.exposure.end > now + rhythm_.period() / late_stamps)
+        told_end_ > now + rhythm_.period() / late_stamps)
         throw DamagedFrame(fmt::format("frame {} claims to be exposed in the future", frame.sequence),
                            "the camera's timestamps come from another clock; update its driver");
 }
@@ -133,6 +133,9 @@ std::uint64_t FrameSource::lost_while_waiting(const Frame& frame, const Place& b
 FrameSource::Place FrameSource::take_in(Frame& frame) {
     const Place before = std::exchange(last_, Place{frame.sequence, frame.timestamp});
     in_rhythm_ = rhythm_.follow(frame);
+    // The rhythm's prediction takes the longest bound that a driver told; what it told of this frame was cut off at the
+    // present, and is what may not lie beyond it.
+    told_end_ = measured_ ? rhythm_.exposure_of(frame).end : frame.exposure.end;
     frame.exposure = rhythm_.locked() && in_rhythm_ ? rhythm_.predicted(frame.sequence) : rhythm_.exposure_of(frame);
     note_picture(frame);
     return before;

@@ -90,6 +90,7 @@ private:
     CameraInfo info_;
     std::optional<MeasuredTiming> measured_;
     ExposureClock rhythm_;
+    TimePoint told_end_;  ///< of the exposure of the frame taken in last
     bool in_rhythm_ = true;
     std::deque<std::pair<std::uint64_t, std::uint64_t>> pictures_;  ///< sequence and hash of the latest
     std::optional<std::uint64_t> repeated_;

@@ -69,8 +69,8 @@ std::optional<Job> follow_up(const Job& job) {
 
 Job after_a_crash(Job job, const fs::path& sessions) {
     const bool captures = lane_of(job.kind) == Lane::rig;
-    if (captures && !job.session.empty() && is_sealed(sessions / job.session))
-        return finished(std::move(job), sessions / job.session);
+    const fs::path session = sessions / job.session;
+    if (captures && !job.session.empty() && is_sealed(session)) return finished(std::move(job), session);
     if (job.attempts >= most_attempts) return failed(std::move(job));
     job.state = JobState::queued;
     if (!captures) return job;
