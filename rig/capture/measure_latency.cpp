@@ -43,7 +43,9 @@ public:
     LatencyReport run() {
         lamps_.dark();
         if (!source_.find_rhythm(clock_.now() + 32 * period() + to_nanoseconds(rig_.capture.frame_deadline)))
-            throw InputError("the camera's timestamps keep no rhythm", "see docs/camera-settings.md");
+            throw InputError("the camera's timestamps keep no rhythm",
+                             "switch off what changes the frame rate, dynamic frame rate and automatic exposure, or "
+                             "give frame_rate in [camera]");
         learn_pictures();
         for (int flip = 0; flip < options_.flips; ++flip) {
             work_.tell({"measure", static_cast<std::size_t>(flip), static_cast<std::size_t>(options_.flips), ""});

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 #include <vector>
 
 #include "acquisition/frame/error.h"
@@ -11,6 +10,7 @@
 #include "acquisition/session/frame_file.h"
 #include "acquisition/session/journal.h"
 #include "acquisition/session/session_json.h"
+#include "processing/formats/jpeg_writer.h"
 #include "processing/maps/srgb.h"
 
 namespace darkbox {
@@ -107,11 +107,8 @@ cv::Mat3f decimated(const Frame& frame) {
 std::string jpeg_of(const cv::Mat3f& linear) {
     constexpr double most_gain = 20;  // a dark frame is to look dark
     const double gain = std::min(most_gain, viewing_gain(linear, cv::Mat1b(linear.size(), 255)));
-    cv::Mat3b picture = viewable(linear, gain);
-    for (cv::Vec3b& pixel : picture) std::swap(pixel[0], pixel[2]);  // OpenCV writes B, G, R
-    std::vector<unsigned char> bytes;
-    cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, jpeg_quality});
-    return {bytes.begin(), bytes.end()};
+    const std::vector<std::byte> bytes = encode_jpeg(viewable(linear, gain), jpeg_quality);
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 }  // namespace

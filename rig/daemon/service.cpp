@@ -119,10 +119,12 @@ void Service::require_room(const CaptureOrder& order) const {
     std::error_code error;
     const auto free = std::filesystem::space(options_.sessions, error).available;
     if (error || free >= needed) return;
-    throw NoRoom(fmt::format("the capture could not end: it needs up to {:.0f} MiB in {}, where {:.0f} MiB are free",
-                             static_cast<double>(needed) / mebibyte, options_.sessions.string(),
-                             static_cast<double>(free) / mebibyte),
-                 "free space there: darkbox sessions lists what may be archived elsewhere");
+    throw NoRoom(
+        fmt::format("the capture could not end: it needs up to {:.0f} MiB in {}, where {:.0f} MiB are free",
+                    static_cast<double>(needed) / mebibyte, options_.sessions.string(),
+                    static_cast<double>(free) / mebibyte),
+        "free space there: darkbox sessions lists what may be archived elsewhere; a camera whose width and height "
+        "rig.toml does not say is taken for one of 24 megapixels");
 }
 
 Job Service::start_capture(const CaptureOrder& order) {

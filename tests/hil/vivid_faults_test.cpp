@@ -117,6 +117,7 @@ TEST_F(VividFaults, NoneLeavesACompleteSession) {
     const CapturedSession captured = capture();
     EXPECT_EQ(captured.session.frames().size(), 4U);
     EXPECT_EQ(captured.summary.repeated, 0);
+    for (const SessionEvent& event : captured.session.events()) std::cout << "  told: " << event.what << '\n';
 }
 
 TEST_F(VividFaults, FlaggedBufferIsTakenAgain) { expect_repaired(Vivid::inject_buffer_error, "flagged as damaged"); }

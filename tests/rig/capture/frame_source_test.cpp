@@ -43,6 +43,21 @@ TEST_F(FrameSourceTest, PassesOverFramesThatTheQueueHeldBack) {
     EXPECT_EQ(source.take_lost(), 0) << "what a full queue drops is not lost to this wait";
 }
 
+TEST_F(FrameSourceTest, BelievesADriverThatTellsTheLatestEndThereCouldBe) {
+    camera.tamper = [&](Frame& frame, int) {
+        frame.exposure.end = std::min(frame.timestamp + milliseconds(200), clock.now());
+    };
+    FrameSource source(camera, clock, {}, work);
+    // Until the rhythm is known, each frame is told when it lay in the queue for long: with all of that bound.
+    for (int i = 0; i < 12; ++i) {
+        clock.sleep_for(seconds(1));
+        source.next_until(clock.now() + seconds(1));
+    }
+    const TimePoint switched = clock.now();
+    const Frame frame = source.first_after(switched, switched + seconds(1));
+    EXPECT_GE(frame.exposure.begin, switched);
+}
+
 TEST_F(FrameSourceTest, CountsFramesLostWhileItWaits) {
     FrameSource source(camera, clock, {}, work);
     const TimePoint switched = clock.now();
