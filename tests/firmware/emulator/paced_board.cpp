@@ -67,6 +67,12 @@ bool PacedBoard::discard(const RequestPtr& request) {
     return true;
 }
 
+void PacedBoard::drop(const RequestPtr& request) {
+    const std::lock_guard lock(mutex_);
+    waiting_.remove(request);
+    ended_.remove(request);
+}
+
 void PacedBoard::end(const RequestPtr& request) {
     ended_.push_back(request);
     something_ended_.notify_all();

@@ -34,6 +34,8 @@ public:
     void submit(const RequestPtr& request);
     /// False when it is over already.
     bool discard(const RequestPtr& request);
+    /// Its owner is gone: nobody will take it, whether it is over or not.
+    void drop(const RequestPtr& request);
     /// Waits for a transfer of this owner to be over, but not longer; the first that was not taken yet.
     RequestPtr take_ended(const void* owner, std::chrono::microseconds patience);
 

@@ -21,8 +21,12 @@ struct Unref {
 };
 using DataPtr = std::unique_ptr<UMockdevIoctlData, Unref>;
 
+/// Null when the client is gone, or gave a null pointer.
 DataPtr resolve(UMockdevIoctlData* data, std::size_t offset, std::size_t size) {
-    return DataPtr(umockdev_ioctl_data_resolve(data, offset, size, nullptr));
+    GError* error = nullptr;
+    DataPtr resolved(umockdev_ioctl_data_resolve(data, offset, size, &error));
+    g_clear_error(&error);
+    return resolved;
 }
 
 void update(UMockdevIoctlData* data, std::size_t offset, const void* bytes, std::size_t size) {
@@ -41,7 +45,13 @@ struct UsbTestbed::Bed {
 
 /// One board, and the URBs that its clients gave.
 struct UsbTestbed::Device {
+    /// What umockdev's thread has of a device: a client that dies late is answered after its device has ended.
+    struct Link {
+        std::mutex mutex;
+        Device* device = nullptr;  ///< guarded by mutex
+    };
     struct Urb {
+        std::unique_ptr<UMockdevIoctlClient, Unref> client;  ///< kept, so that no later client has its address
         PacedBoard::RequestPtr request;
         DataPtr urb;
         DataPtr buffer;
@@ -50,27 +60,34 @@ struct UsbTestbed::Device {
 
     Device(Bed& b, int n, const std::filesystem::path& elf, const std::optional<lamp_protocol::Identity>& identity)
         : bed(b), number(n), board(elf, identity) {
+        link->device = this;
         board.on_presence = [this](bool present) { present ? appear() : vanish(); };
         appear();
     }
-    ~Device() { vanish(); }
+    ~Device() {
+        vanish();
+        const std::lock_guard lock(link->mutex);
+        link->device = nullptr;
+    }
 
     void appear();
     void vanish();
-    static gboolean handle(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self);
+    static gboolean handle(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer link);
     void answer(UMockdevIoctlClient* client);
     void submit(UMockdevIoctlClient* client, UMockdevIoctlData* urb_data);
     void reap(UMockdevIoctlClient* client, UMockdevIoctlData* pointer);
     void discard(UMockdevIoctlClient* client);
+    void drop_the_departed();
 
     Bed& bed;
     int number;
-    PacedBoard board;
+    std::shared_ptr<Link> link = std::make_shared<Link>();
     UMockdevIoctlBase* handler = nullptr;
     std::string syspath;
     std::string node;
     std::list<Urb> urbs;  ///< on the handler's thread alone
     std::atomic<bool> here{false};
+    PacedBoard board;  ///< the first to end: its thread uses the others
 };
 
 void UsbTestbed::Device::appear() {
@@ -93,7 +110,9 @@ void UsbTestbed::Device::appear() {
     if (umockdev_testbed_add_from_string(bed.testbed, device.c_str(), &error) == 0)
         throw std::runtime_error(fmt::format("umockdev: {}", error->message));
     handler = umockdev_ioctl_base_new();
-    g_signal_connect(handler, "handle-ioctl", G_CALLBACK(&Device::handle), this);
+    g_signal_connect_data(
+        handler, "handle-ioctl", G_CALLBACK(&Device::handle), new std::shared_ptr<Link>(link),
+        [](gpointer held, GClosure*) { delete static_cast<std::shared_ptr<Link>*>(held); }, GConnectFlags{});
     umockdev_testbed_attach_ioctl(bed.testbed, node.c_str(), handler, nullptr);
     here = true;
     umockdev_testbed_uevent(bed.testbed, syspath.c_str(), "add");
@@ -107,17 +126,34 @@ void UsbTestbed::Device::vanish() {
     umockdev_testbed_remove_device(bed.testbed, syspath.c_str());
 }
 
-gboolean UsbTestbed::Device::handle(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self) {
-    static_cast<Device*>(self)->answer(client);
+gboolean UsbTestbed::Device::handle(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer link) {
+    Link& held = **static_cast<std::shared_ptr<Link>*>(link);
+    const std::lock_guard lock(held.mutex);
+    if (held.device != nullptr)
+        held.device->answer(client);
+    else
+        umockdev_ioctl_client_complete(client, -1, ENODEV);
     return TRUE;
+}
+
+/// As the kernel does when a file is closed: the transfers of a process that was killed end with it.
+void UsbTestbed::Device::drop_the_departed() {
+    urbs.remove_if([&](const Urb& urb) {
+        const bool departed = umockdev_ioctl_client_get_connected(urb.client.get()) == FALSE;
+        if (departed) board.drop(urb.request);
+        return departed;
+    });
 }
 
 void UsbTestbed::Device::answer(UMockdevIoctlClient* client) {
     const unsigned long request = umockdev_ioctl_client_get_request(client);
     UMockdevIoctlData* arg = umockdev_ioctl_client_get_arg(client);
     const auto complete = [&](long result, int error) { umockdev_ioctl_client_complete(client, result, error); };
+    drop_the_departed();
     if (request == USBDEVFS_REAPURBNDELAY) {
-        reap(client, resolve(arg, 0, sizeof(void*)).get());
+        const DataPtr pointer = resolve(arg, 0, sizeof(void*));
+        if (!pointer) return complete(-1, EFAULT);
+        reap(client, pointer.get());
     } else if (request == USBDEVFS_DISCARDURB) {
         discard(client);
     } else if (!here) {
@@ -129,6 +165,7 @@ void UsbTestbed::Device::answer(UMockdevIoctlClient* client) {
         complete(0, 0);
     } else if (request == USBDEVFS_CLEAR_HALT) {
         const DataPtr value = resolve(arg, 0, sizeof(unsigned));
+        if (!value) return complete(-1, EFAULT);
         const auto endpoint = static_cast<std::uint16_t>(*reinterpret_cast<const unsigned*>(value->data));
         board.with_board([&](EmulatedBoard&, EmulatedHost& host) { host.control({0x02, 1, 0, endpoint, 0}); });
         complete(0, 0);
@@ -143,16 +180,21 @@ void UsbTestbed::Device::answer(UMockdevIoctlClient* client) {
 }
 
 void UsbTestbed::Device::submit(UMockdevIoctlClient* client, UMockdevIoctlData* urb_data) {
+    const auto refuse = [&](int error) { umockdev_ioctl_client_complete(client, -1, error); };
     Urb urb;
+    urb.client.reset(static_cast<UMockdevIoctlClient*>(g_object_ref(client)));
     urb.urb.reset(urb_data);
+    if (!urb.urb) return refuse(EFAULT);
     usbdevfs_urb raw;
     std::memcpy(&raw, urb_data->data, sizeof raw);
     const auto length = static_cast<std::size_t>(raw.buffer_length);
     urb.buffer = resolve(urb_data, offsetof(usbdevfs_urb, buffer), length);
+    if (!urb.buffer && length > 0) return refuse(EFAULT);
     const std::uint8_t* bytes = urb.buffer ? urb.buffer->data : nullptr;
     auto request = std::make_shared<UsbRequest>();
     request->endpoint = raw.endpoint;
     urb.is_control = raw.type == USBDEVFS_URB_TYPE_CONTROL;
+    if (urb.is_control && length < 8) return refuse(EINVAL);
     if (urb.is_control) {
         const auto word = [&](int at) { return static_cast<std::uint16_t>(bytes[at] | bytes[at + 1] << 8); };
         request->endpoint = 0;
