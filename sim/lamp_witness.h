@@ -30,6 +30,8 @@ public:
 
     /// The strobe line fell. Moments come in the order of time, and none after now.
     virtual void strobe(TimePoint /*moment*/) {}
+    /// From `first` on the line rises once a period and stays up for `exposed`; a period of 0 means that it stays down.
+    virtual void strobe_runs(TimePoint /*first*/, Nanoseconds /*period*/, Nanoseconds /*exposed*/) {}
     /// Called before every command, to bring strobes up to date that fell before it.
     virtual void set_strobe_source(std::function<void()> /*catch_up*/) {}
 };

@@ -15,13 +15,22 @@ constexpr double full_level = 255.0;
 
 }  // namespace
 
-SeenLamps::SeenLamps(const RigDescription& rig) : file_(rig.sim.lamps_seen) {
+SeenLamps::SeenLamps(const RigDescription& rig) : file_(rig.sim.lamps_seen), strobe_line_(rig.sim.strobe_line) {
     for (const LampDescription& lamp : rig.lamps) channels_.push_back(lamp.channel);
 }
 
 std::vector<LampShare> SeenLamps::burning_during(const Interval& interval) const {
     read_on();
     return sim::burning_during(history_, interval);
+}
+
+void SeenLamps::strobe_runs(TimePoint first, Nanoseconds period, Nanoseconds exposed) {
+    if (strobe_line_.empty()) return;
+    std::ofstream out(strobe_line_, std::ios::app);
+    out << fmt::format("{} {} {}\n", first.time_since_epoch().count(), period.count(), exposed.count()) << std::flush;
+    if (!out)
+        throw DeviceError(fmt::format("{}: the strobe line cannot be written", strobe_line_.string()),
+                          "check sim.strobe_line in rig.toml");
 }
 
 /// Whole lines only: the last one may still be written.

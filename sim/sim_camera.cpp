@@ -84,12 +84,14 @@ void SimCamera::start() {
     queue_.clear();
     // Now, while nobody waits with a lamp lit: in real time the rendering takes longer than a lamp may be on.
     if (!scene_.lamps.empty()) picture_of(LampId{0});
+    lamps_.strobe_runs(stream_start_, period_, to_nanoseconds(controls_.exposure));
 }
 
 void SimCamera::stop() {
     if (state_ != State::streaming) return;
     state_ = State::ready;
     queue_.clear();
+    lamps_.strobe_runs(clock_.now(), {}, {});
     if (next_sequence_ >= first_sequence_ + static_cast<std::uint64_t>(options_.latency_frames))
         controls_before_ = controls_;
 }

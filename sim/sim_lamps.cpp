@@ -48,7 +48,7 @@ void SimLamps::dark() {
     command(clock_.now(), {});
 }
 
-void SimLamps::arm(const std::vector<StrobeStep>& program) {
+void SimLamps::arm(const std::vector<StrobeStep>& program, Nanoseconds /*exposed*/) {
     for (const StrobeStep& step : program)
         if (step.lamp) check(*step.lamp, step.level);
     dark();

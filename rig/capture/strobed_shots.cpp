@@ -4,12 +4,11 @@
 
 #include <algorithm>
 
-#include "rig/capture/gap_budget.h"
-
 namespace darkbox {
 namespace {
 
-constexpr std::size_t longest_program = 64;
+/// Of a program: its first lamp may be exposed twice, and darkness ends it.
+constexpr std::size_t most_shots = StrobedLamps::longest_program - 2;
 constexpr int spare_frames = 16;
 
 double ms(Nanoseconds d) { return to_seconds(d) * 1000.0; }
@@ -30,10 +29,10 @@ Unproven StrobedShots::take(std::span<const Shot> shots, const ShotSink& proven)
     GapBudget budget = gap_budget(source_.rhythm(), rig_, shots);
     budget.margin = source_.rhythm().margin();
     if (!budget.fits()) return give_up("the gap between exposures is too short: " + budget.words());
-    for (std::size_t first = 0; first < shots.size(); first += longest_program) {
-        const auto part = shots.subspan(first, std::min(longest_program, shots.size() - first));
+    for (std::size_t first = 0; first < shots.size(); first += most_shots) {
+        const auto part = shots.subspan(first, std::min(most_shots, shots.size() - first));
         try {
-            take_program(part, proven);
+            take_program(part, budget, proven);
         } catch (const DeviceError& error) {
             // Some lamp of the program may have shone: it must fade as any other.
             lamps_.timeline().switched({clock_.now(), clock_.now()}, part.front().lamp);
@@ -51,13 +50,14 @@ void StrobedShots::leave(std::span<const Shot> shots, const std::string& reason)
         unproven_.reasons.push_back(reason);
 }
 
-StrobedShots::Stepped StrobedShots::step_through(const std::vector<StrobeStep>& program) {
+StrobedShots::Stepped StrobedShots::step_through(const std::vector<StrobeStep>& program, const GapBudget& budget) {
     Stepped stepped;
     StrobedLamps& strobed = *lamps_.array().strobed();
     const ExposureClock& rhythm = source_.rhythm();
     const auto frames = static_cast<int>(program.size()) + source_.info().queue_depth + spare_frames;
     const TimePoint deadline = clock_.now() + frames * rhythm.period() + to_nanoseconds(rig_.capture.frame_deadline);
-    strobed.arm(program);
+    // In the middle of what is left of the gap: the exposure is over, and there is time to settle before the next.
+    strobed.arm(program, budget.exposed + (budget.period - budget.exposed - budget.settle) / 2);
     bool done = false;
     while (!done) {
         try {
@@ -82,7 +82,7 @@ StrobedShots::Stepped StrobedShots::step_through(const std::vector<StrobeStep>& 
     return stepped;
 }
 
-void StrobedShots::take_program(std::span<const Shot> shots, const ShotSink& proven) {
+void StrobedShots::take_program(std::span<const Shot> shots, const GapBudget& budget, const ShotSink& proven) {
     std::vector<StrobeStep> program;
     for (const Shot& shot : shots) {
         // The first of all is exposed twice: two exposures tell what the noise comes to.
@@ -91,7 +91,7 @@ void StrobedShots::take_program(std::span<const Shot> shots, const ShotSink& pro
     }
     program.push_back({});
     const std::size_t extra = program.size() - shots.size() - 1;
-    Stepped stepped = step_through(program);
+    Stepped stepped = step_through(program, budget);
     for (const StrobeEvent& event : stepped.events) lamps_.note(event, program.at(event.step).lamp);
 
     if (!stepped.doubt.empty()) return leave(shots, stepped.doubt);

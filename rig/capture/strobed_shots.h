@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "rig/capture/frame_source.h"
+#include "rig/capture/gap_budget.h"
 #include "rig/capture/picture_check.h"
 #include "rig/capture/taken_shot.h"
 #include "rig/capture/timed_lamps.h"
@@ -31,8 +32,8 @@ private:
         std::string doubt;  ///< why none of the frames can be believed
     };
 
-    Stepped step_through(const std::vector<StrobeStep>& program);
-    void take_program(std::span<const Shot> shots, const ShotSink& proven);
+    Stepped step_through(const std::vector<StrobeStep>& program, const GapBudget& budget);
+    void take_program(std::span<const Shot> shots, const GapBudget& budget, const ShotSink& proven);
     void leave(std::span<const Shot> shots, const std::string& reason);
 
     const RigDescription& rig_;

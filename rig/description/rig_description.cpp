@@ -213,7 +213,8 @@ void read_lamps(TomlSection& section, RigDescription& rig) {
             lamp.fail("name", fmt::format("is one of {} lamps; allowed: 1 to {}", lamps.size(), most_lamps),
                       "describe at most 64 lamps");
         rig.lamps.push_back(read_lamp(lamp, rig, active_low));
-        refuse_duplicate(rig.lamps, [](const LampDescription& l) { return l.name; }, lamp, "name");
+        refuse_duplicate(
+            rig.lamps, [](const LampDescription& l) { return l.name; }, lamp, "name");
         const std::string key = output_key(rig);
         const auto output = [&](const LampDescription& l) {
             return key == "line" ? l.line : std::to_string(key == "address" ? l.address : l.channel);
@@ -321,7 +322,7 @@ CaptureDescription read_capture(TomlSection& section) {
 SimDescription read_sim(TomlSection& section) {
     SimDescription sim;
     section.allow({"scene", "width", "height", "bit_depth", "full_well_e", "read_noise_e", "latency_frames",
-                   "queue_depth", "seed", "real_time", "lamps_seen"});
+                   "queue_depth", "seed", "real_time", "lamps_seen", "strobe_line"});
     const auto whole = [&](const char* key, Allowed<std::int64_t> allowed, int fallback) {
         return static_cast<int>(section.integer(key, allowed).value_or(fallback));
     };
@@ -338,6 +339,10 @@ SimDescription read_sim(TomlSection& section) {
         static_cast<std::uint64_t>(section.integer("seed", any_seed).value_or(static_cast<std::int64_t>(sim.seed)));
     sim.real_time = section.flag("real_time").value_or(sim.real_time);
     sim.lamps_seen = section.text("lamps_seen").value_or("");
+    sim.strobe_line = section.text("strobe_line").value_or("");
+    if (!sim.strobe_line.empty() && sim.lamps_seen.empty())
+        section.fail("strobe_line", "has strobe_line without lamps_seen",
+                     "remove it: simulated lamps hear the camera's strobe line without a file");
     if (!sim.lamps_seen.empty() && !sim.real_time)
         section.fail("lamps_seen", "has lamps_seen without real_time",
                      "add real_time = true: real lamps know no virtual time");

@@ -88,8 +88,9 @@ struct SimDescription {
     int latency_frames = 1;
     int queue_depth = 2;
     std::uint64_t seed = 1;
-    bool real_time = false;              ///< virtual time otherwise
-    std::filesystem::path lamps_seen{};  ///< the camera sees the lamps that this file tells of, not simulated ones
+    bool real_time = false;               ///< virtual time otherwise
+    std::filesystem::path lamps_seen{};   ///< the camera sees the lamps that this file tells of, not simulated ones
+    std::filesystem::path strobe_line{};  ///< with lamps_seen: where the camera's strobe line is told
 };
 
 /// A rig.toml, parsed and valid. Plain data.

@@ -21,15 +21,19 @@ struct StrobeEvent {
     Interval moment;       ///< on the capture's clock: the lamps changed somewhere inside
 };
 
-/// Lamps that step through a program by themselves, at the camera's strobe line: each end of a frame's exposure, that
-/// of its last row, makes the next step. What drives them may be slow; the steps are not. Thread-compatible.
+/// Lamps that step through a program by themselves, at the camera's strobe line, which is up while a frame is exposed,
+/// first row to last: each end of an exposure makes the next step. What drives them may be slow; the steps are not.
+/// Thread-compatible.
 class StrobedLamps {
 public:
+    static constexpr std::size_t longest_program = 64;  ///< steps
+
     virtual ~StrobedLamps() = default;
-    /// Takes over a program and waits, dark, for the strobe. After the last step the lamps stay as it left them, for no
-    /// longer than they bear; LampArray::light() and dark() end a program. Throws DeviceError, InputError for a program
-    /// that is too long or names a lamp that is not there.
-    virtual void arm(const std::vector<StrobeStep>& program) = 0;
+    /// Takes over a program, whose last step is dark, and waits, dark, for the strobe. `exposed` is how long after its
+    /// rise every row is exposed, for lamps that look at the rise alone. LampArray::light() and dark() end a program.
+    /// Throws DeviceError, and std::invalid_argument for a program that is too long, does not end dark, or names a lamp
+    /// that is not there.
+    virtual void arm(const std::vector<StrobeStep>& program, Nanoseconds exposed) = 0;
     /// The steps made since this was last asked. Throws DeviceError.
     virtual std::vector<StrobeEvent> take_events() = 0;
 };

@@ -90,6 +90,7 @@ void UsbLamps::light(LampId lamp, double level) {
     LightCommand light{};
     light.lamps[output / 8] = static_cast<std::uint8_t>(1U << output % 8);
     light.level = level_of(level);
+    if (stepping_) dark();
     try {
         controller_.command(Command::light, light);
         lit_ = true;
@@ -100,6 +101,7 @@ void UsbLamps::light(LampId lamp, double level) {
 }
 
 void UsbLamps::dark() {
+    stepping_ = false;
     if (darken()) {
         lit_ = false;
         return;
@@ -177,29 +179,74 @@ void UsbLamps::run_program(const std::vector<LampStep>& wanted, std::uint16_t ro
     controller_.command(Command::run_program, run);
 }
 
-std::optional<LampStepDone> UsbLamps::next_step_done(TimePoint deadline) {
-    const auto event = controller_.next_event(deadline);
+/// None at the deadline.
+std::optional<LampEvent> UsbLamps::program_event(TimePoint deadline) {
+    auto event = controller_.next_event(deadline);
     if (controller_.events_lost() != events_lost_before_)
         throw DeviceError("the lamp controller lost events of its program", "run it again");
-    if (!event) {
-        if (controller_.gone()) throw DeviceError("the lamp controller is gone", "check its cable and its supply");
-        throw DeadlineError("no step of the lamps' program was over before the deadline", "check the camera's strobe");
-    }
-    const Event& raw = event->raw;
-    if (raw.kind == EventKind::program_done) return std::nullopt;
-    if (raw.kind == EventKind::fault)
-        throw DeviceError(fmt::format("the lamps' program ended: {}", fmt::join(faults_in_words(raw.code), "; ")),
-                          "see docs/lamp-controller.md");
+    if (!event && controller_.gone())
+        throw DeviceError("the lamp controller is gone", "check its cable and its supply");
+    if (event && event->raw.kind == EventKind::fault)
+        throw DeviceError(
+            fmt::format("the lamps' program ended: {}", fmt::join(faults_in_words(event->raw.code), "; ")),
+            "see docs/lamp-controller.md");
+    return event;
+}
+
+LampStepDone UsbLamps::step_done(const LampEvent& event) const {
+    if (!event.when)
+        throw DeviceError("the lamp controller's clock was never compared with this host's", "connect it again");
+    const Event& raw = event.raw;
     LampStepDone done;
     done.step = raw.detail;
     done.round = raw.round;
     for (std::uint32_t i = 0; i < channels_.size(); ++i)
         if (channels_[i].output == raw.lamp) done.lamp = LampId{i};
-    const auto when = event->when.value_or(DeviceClock::Mapped{});
-    done.exposure.begin = when.time;
-    done.exposure.end = when.time + std::chrono::microseconds(raw.value);
-    done.uncertainty = when.uncertainty;
+    done.exposure.begin = event.when->time;
+    done.exposure.end = event.when->time + std::chrono::microseconds(raw.value);
+    done.uncertainty = event.when->uncertainty;
     return done;
+}
+
+std::optional<LampStepDone> UsbLamps::next_step_done(TimePoint deadline) {
+    const auto event = program_event(deadline);
+    if (!event)
+        throw DeadlineError("no step of the lamps' program was over before the deadline", "check the camera's strobe");
+    if (event->raw.kind == EventKind::program_done) return std::nullopt;
+    return step_done(*event);
+}
+
+void UsbLamps::arm(const std::vector<StrobeStep>& program, Nanoseconds exposed) {
+    if (program.empty() || program.size() > longest_program || program.back().lamp)
+        throw std::invalid_argument(fmt::format("a strobed program of 1 to {} steps must end dark", longest_program));
+    // The board steps at the end of an exposure: that of the dark one lights the program's first lamp.
+    std::vector<LampStep> steps{{.lamp = {}, .exposure = exposed, .wait_for_strobe = true}};
+    for (const StrobeStep& step : std::span(program).first(program.size() - 1))
+        steps.push_back({.lamp = step.lamp, .level = step.level, .exposure = exposed, .wait_for_strobe = true});
+    dark();
+    lit_ = stepping_ = true;
+    run_program(steps);
+}
+
+std::vector<StrobeEvent> UsbLamps::take_events() {
+    std::vector<StrobeEvent> made;
+    try {
+        while (stepping_) {
+            const auto event = program_event({});
+            if (!event) break;
+            if (event->raw.kind == EventKind::program_done) {
+                stepping_ = false;
+            } else {
+                const LampStepDone done = step_done(*event);
+                made.push_back(
+                    {done.step, {done.exposure.end - done.uncertainty, done.exposure.end + done.uncertainty}});
+            }
+        }
+    } catch (const DeviceError&) {
+        loss_told_ = controller_.gone();
+        throw;
+    }
+    return made;
 }
 
 }  // namespace darkbox

@@ -6,6 +6,7 @@
 #include "rig/description/rig_description.h"
 #include "rig/lamps/lamp_array.h"
 #include "rig/lamps/lamp_controller.h"
+#include "rig/lamps/strobed_lamps.h"
 
 namespace darkbox {
 
@@ -33,7 +34,7 @@ struct LampStepDone {
 /// reached its max_on or max_duty, and when it is unplugged; dark() waits for a board that was unplugged to come back,
 /// and throws even so when that interrupted a lamp's light and nobody was told yet: the shot is to be taken again.
 /// Thread-compatible; the heartbeat has a thread of its own.
-class UsbLamps final : public LampArray {
+class UsbLamps final : public LampArray, public StrobedLamps {
 public:
     /// Opens the board that [lamps.usb] names. Throws DeviceError, and InputError where the description asks for what
     /// the board cannot do.
@@ -45,6 +46,11 @@ public:
     void light(LampId lamp, double level) override;
     void dark() override;
     LampHealth health() override;
+    StrobedLamps* strobed() override { return this; }
+
+    /// On the board: a dark step that waits for the strobe, then the lamps, each lit for one exposure of `exposed`.
+    void arm(const std::vector<StrobeStep>& program, Nanoseconds exposed) override;
+    std::vector<StrobeEvent> take_events() override;
 
     /// Uploads the steps, at most 64, and starts them. The lamps are dark until the first begins, and after the last.
     void run_program(const std::vector<LampStep>& steps, std::uint16_t rounds = 1);
@@ -66,11 +72,14 @@ private:
     bool darken();
     bool is_dark();
     lamp_protocol::Step step_of(const LampStep& step) const;
+    std::optional<LampEvent> program_event(TimePoint deadline);
+    LampStepDone step_done(const LampEvent& event) const;
 
     std::vector<Channel> channels_;
     LampController controller_;
     std::uint64_t events_lost_before_ = 0;
     bool lit_ = false;        ///< as far as is known here
+    bool stepping_ = false;   ///< a strobed program is under way
     bool loss_told_ = false;  ///< of the board, since it was last reached
 };
 

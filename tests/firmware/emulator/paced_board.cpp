@@ -183,10 +183,24 @@ void PacedBoard::watch_presence() {
     if (on_presence) on_presence(true);
 }
 
+TimePoint PacedBoard::board_time() const {
+    const auto since = std::chrono::nanoseconds((board_.cycle() - cycle_start_) * 1000 / EmulatedBoard::cycles_per_us);
+    return TimePoint((wall_start_ + since).time_since_epoch());
+}
+
+void PacedBoard::follow_strobe() {
+    const bool up = strobe_line && strobe_line(board_time());
+    if (up != strobe_up_) board_.set_strobe(up);
+    strobe_up_ = up;
+}
+
 void PacedBoard::catch_up() {
     const auto wall = steady_clock::now() - wall_start_;
     const auto due = cycle_start_ + static_cast<std::uint64_t>(std::chrono::nanoseconds(wall).count()) * 16 / 1000;
-    if (board_.cycle() < due) board_.run_us(slice_us);
+    if (board_.cycle() < due) {
+        follow_strobe();
+        board_.run_us(slice_us);
+    }
     if (board_.cycle() + std::chrono::nanoseconds(hopelessly_late).count() * 16 / 1000 < due) {
         wall_start_ = steady_clock::now();
         cycle_start_ = board_.cycle();

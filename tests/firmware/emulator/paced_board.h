@@ -7,6 +7,7 @@
 #include <mutex>
 #include <thread>
 
+#include "acquisition/frame/units.h"
 #include "tests/firmware/emulator/emulated_host.h"
 
 namespace darkbox::test {
@@ -48,6 +49,11 @@ public:
     std::vector<std::uint8_t> configuration_descriptor;
     /// May change what a host gets to a request, on the board's thread: a board that is not as it should be.
     std::function<void(const ControlRequest&, std::vector<std::uint8_t>&)> alter_answer;
+    /// Whether the camera's strobe line is up at a moment of CLOCK_MONOTONIC; asked on the board's thread, as its time
+    /// goes.
+    std::function<bool(TimePoint)> strobe_line;
+    /// Of CLOCK_MONOTONIC: where the chip's time has got to; on the board's thread.
+    TimePoint board_time() const;
     /// Called on the board's thread when it went away by a reset, and when it is back.
     std::function<void(bool present)> on_presence;
 
@@ -55,6 +61,7 @@ private:
     void run();
     void enumerate();
     void catch_up();
+    void follow_strobe();
     void watch_presence();
     bool serve();
     bool attempt(UsbRequest& request);
@@ -73,6 +80,7 @@ private:
     bool ends_ = false;                      ///< guarded by mutex_
     bool present_ = true;
     unsigned resets_seen_ = 0;
+    bool strobe_up_ = false;
     std::chrono::steady_clock::time_point wall_start_;
     std::uint64_t cycle_start_ = 0;
     std::thread thread_;

@@ -28,10 +28,39 @@ using testing::HasSubstr;
 
 constexpr int lamp_count = 9;
 
+/// The camera's strobe line, as its file tells of it. Thread-hostile.
+class StrobeLine {
+public:
+    explicit StrobeLine(fs::path file) : file_(std::move(file)) {}
+    bool up(TimePoint t) {
+        if (t >= look_again_) read(t);
+        return period_ > 0 && t >= first_ && (t - first_).count() % period_ < exposed_;
+    }
+
+private:
+    void read(TimePoint t) {
+        look_again_ = t + 2ms;
+        std::ifstream in(file_);
+        Nanoseconds::rep first = 0;
+        for (std::string line; std::getline(in, line) && !in.eof();)
+            if (std::istringstream words(line); words >> first >> period_ >> exposed_)
+                first_ = TimePoint(Nanoseconds(first));
+    }
+
+    fs::path file_;
+    TimePoint look_again_;
+    TimePoint first_;
+    Nanoseconds::rep period_ = 0;
+    Nanoseconds::rep exposed_ = 0;
+};
+
 class UsbSession : public testing::Test {
 protected:
     void SetUp() override {
         if (!UsbTestbed::available()) GTEST_SKIP() << "runs under umockdev-wrapper";
+        set_up("settled");
+    }
+    void set_up(const std::string& mode) {
         std::string toml = small_rig(lamp_count);
         const auto replace = [&](const std::string& old, const std::string& with) {
             ASSERT_NE(toml.find(old), std::string::npos) << old;
@@ -39,7 +68,9 @@ protected:
         };
         replace("[lamps]\ndriver = \"sim\"\n",
                 "[lamps]\ndriver = \"usb\"\ndistant = true\n[lamps.usb]\nserial = \"HOST-1\"\nheartbeat_ms = 600\n");
-        replace("[sim]\n", fmt::format("[sim]\nreal_time = true\nlamps_seen = \"{}\"\n", seen_.string()));
+        replace("[sim]\n", fmt::format("[capture]\nmode = \"{}\"\n[sim]\nreal_time = true\nlamps_seen = \"{}\"\n"
+                                       "strobe_line = \"{}\"\n",
+                                       mode, seen_.string(), strobe_line_.string()));
         std::ofstream(rig_) << toml;
 
         std::ofstream(seen_) << "0 0 0\n";
@@ -49,11 +80,13 @@ protected:
             board.on_lamps = [this](const LampsSeen& lamps) {
                 crowded_ |= (lamps.lit & (lamps.lit - 1)) != 0;
                 ever_lit_ |= lamps.lit;
-                std::ofstream(seen_, std::ios::app) << fmt::format(
-                    "{} {:x} {}\n", SystemClock().now().time_since_epoch().count(), lamps.lit, lamps.level);
+                std::ofstream(seen_, std::ios::app)
+                    << fmt::format("{} {:x} {}\n", when().time_since_epoch().count(), lamps.lit, lamps.level);
             };
         });
     }
+    /// Of a switch of the lamps: as the host sees it, late when this machine is.
+    virtual TimePoint when() { return SystemClock().now(); }
     void start() {
         daemon_.emplace(
             std::vector<std::string>{DARKBOXD_PROGRAM, "--config", rig_, "--socket", socket_, "--sessions", sessions_},
@@ -74,6 +107,23 @@ protected:
         darkbox({"process", session});
         return darkbox({"evaluate", session, "--no-held-out"}).at("mean_angular_error_deg");
     }
+    /// That each frame was lit by its lamp alone, and wholly, by what the camera tells of the light.
+    void expect_true_light(const Session& session) const {
+        std::ifstream truth_file(session.folder() / "truth" / "lamps.json");
+        std::map<std::uint64_t, json> burned;
+        const json truth = json::parse(truth_file);
+        for (const json& frame : truth.at("frames")) burned[frame.at("sequence")] = frame.at("lamps");
+        for (const FrameRecord& frame : session.frames()) {
+            const json& lamps = burned.at(frame.sequence);
+            if (!frame.lamp) {
+                EXPECT_EQ(lamps.size(), 0U) << frame.file;
+                continue;
+            }
+            ASSERT_EQ(lamps.size(), 1U) << frame.file;
+            EXPECT_EQ(lamps[0].at("lamp"), frame.lamp->value) << frame.file;
+            EXPECT_NEAR(lamps[0].at("share"), 1.0, 1e-9) << "the whole exposure in its steady light: " << frame.file;
+        }
+    }
     std::uint64_t lit() {
         std::uint64_t lamps = 0;
         bed_->board(board_).with_board([&](EmulatedBoard& board, EmulatedHost&) { lamps = board.lamps().lit; });
@@ -88,6 +138,7 @@ protected:
     TemporaryFolder folder_;
     const fs::path rig_ = folder_.path() / "rig.toml";
     const fs::path seen_ = folder_.path() / "lamps.txt";
+    const fs::path strobe_line_ = folder_.path() / "strobe.txt";
     const fs::path socket_ = folder_.path() / "d.sock";
     const fs::path sessions_ = folder_.path() / "sessions";
     const DaemonClient client_{socket_};
@@ -111,20 +162,7 @@ TEST_F(UsbSession, IsCapturedProcessedAndAgreesWithTheTruth) {
 
     const Session session = Session::open(sessions_ / "torus");
     EXPECT_NO_THROW(session.verify());
-    std::ifstream truth_file(sessions_ / "torus" / "truth" / "lamps.json");
-    std::map<std::uint64_t, json> burned;
-    const json truth = json::parse(truth_file);
-    for (const json& frame : truth.at("frames")) burned[frame.at("sequence")] = frame.at("lamps");
-    for (const FrameRecord& frame : session.frames()) {
-        const json& lamps = burned.at(frame.sequence);
-        if (!frame.lamp) {
-            EXPECT_EQ(lamps.size(), 0U) << frame.file;
-            continue;
-        }
-        ASSERT_EQ(lamps.size(), 1U) << frame.file;
-        EXPECT_EQ(lamps[0].at("lamp"), frame.lamp->value) << frame.file;
-        EXPECT_NEAR(lamps[0].at("share"), 1.0, 1e-9) << "the whole exposure in its steady light: " << frame.file;
-    }
+    expect_true_light(session);
 
     // The same rig with simulated lamps in virtual time shows the same light, and the same normals come of it.
     std::ofstream(folder_.path() / "simulated.toml") << small_rig(lamp_count);
@@ -135,6 +173,38 @@ TEST_F(UsbSession, IsCapturedProcessedAndAgreesWithTheTruth) {
     std::printf("session over USB: %d lamps, %.1f s, normals %.2f deg from the truth; with simulated lamps %.2f deg\n",
                 lamp_count, captured.at("seconds").get<double>(), error_deg, simulated_deg);
     EXPECT_NEAR(error_deg, simulated_deg, 0.2);
+}
+
+/// The board hears the camera's strobe line and steps by itself.
+class StrobedUsbSession : public UsbSession {
+protected:
+    void SetUp() override {
+        if (!UsbTestbed::available()) GTEST_SKIP() << "runs under umockdev-wrapper";
+        set_up("strobed");
+        PacedBoard& board = bed_->board(board_);
+        board.with_board([&](EmulatedBoard&, EmulatedHost&) {
+            board.strobe_line = [line = StrobeLine(strobe_line_)](TimePoint t) mutable { return line.up(t); };
+        });
+    }
+    /// The line and the steps are on the chip's time, be this machine late or not.
+    TimePoint when() override { return bed_->board(board_).board_time(); }
+};
+
+TEST_F(StrobedUsbSession, TakesALampAFrame) {
+    start();
+    const json captured = darkbox({"capture", "--out", "torus", "--socket", socket_});
+    ASSERT_EQ(captured.value("frames", 0), lamp_count + 2);
+    EXPECT_FALSE(crowded_) << "two lamps at once";
+    EXPECT_EQ(lit(), 0U);
+    const Session session = Session::open(sessions_ / "torus");
+    EXPECT_NO_THROW(session.verify());
+    expect_true_light(session);
+    int stepped = 0;
+    for (const FrameRecord& frame : session.frames())
+        stepped += frame.verification.find("strobe's step") != std::string::npos ? 1 : 0;
+    std::printf("strobed session over USB: %d of %d lamps by the strobe\n", stepped, lamp_count);
+    for (const SessionEvent& event : session.events()) std::printf("  %s\n", event.what.c_str());
+    EXPECT_GE(stepped, 1) << "the others were repeated in settled mode, as a late machine has it";
 }
 
 TEST_F(UsbSession, AKilledDaemonLeavesTheLampsToTheBoard) {

@@ -241,6 +241,8 @@ INSTANTIATE_TEST_SUITE_P(
                "has [lamps.usb], but driver \"sim\""},
         BadRig{"seen_without_time", with("width = 320", "width = 320\nlamps_seen = \"f\""),
                "has lamps_seen without real_time"},
+        BadRig{"strobe_of_sim", with("width = 320", "width = 320\nstrobe_line = \"f\""),
+               "has strobe_line without lamps_seen"},
         BadRig{"seen_of_sim", with("width = 320", "width = 320\nlamps_seen = \"f\"\nreal_time = true"),
                "has lamps_seen, but \"sim\" lamps"}));
 

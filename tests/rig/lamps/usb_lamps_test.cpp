@@ -184,8 +184,9 @@ TEST_F(UsbLampsTest, ComeBackAfterTheFirmwareHung) {
 TEST_F(UsbLampsTest, AStallIsClearedAndTheCommandSaidAgain) {
     UsbLamps lamps(rig_of("LC-0001"));
     for (const std::uint16_t endpoint : {std::uint16_t{command_endpoint}, std::uint16_t{event_endpoint}}) {
-        bed->board(board).with_board(
-            [&](EmulatedBoard&, EmulatedHost& host) { host.control({0x02, 3, 0, endpoint, 0}); });
+        bed->board(board).with_board([&](EmulatedBoard&, EmulatedHost& host) {
+            host.control({0x02, 3, 0, endpoint, 0});
+        });
         lamps.light(LampId{3}, 1.0);
         EXPECT_EQ(lit(), bit(21));
         lamps.dark();
@@ -238,6 +239,50 @@ TEST_F(UsbLampsTest, AProgramSteppedByTheStrobe) {
         EXPECT_EQ(done->lamp, LampId{i});
     }
     EXPECT_FALSE(lamps.next_step_done(SystemClock().now() + 1s));
+}
+
+TEST_F(UsbLampsTest, StepsBetweenTheExposuresOfAStrobedCamera) {
+    constexpr Nanoseconds period = 50ms, up = 20ms, stepped = 30ms;
+    const TimePoint first = SystemClock().now() + 200ms;
+    const auto phase = [&](TimePoint t) { return (t - first) % period; };
+    struct Switch {
+        TimePoint when;
+        std::uint64_t lit;
+    };
+    std::vector<Switch> switches;
+    test::PacedBoard& paced = bed->board(board);
+    paced.with_board([&](EmulatedBoard& b, EmulatedHost&) {
+        paced.strobe_line = [=](TimePoint t) { return t >= first && phase(t) < up; };
+        b.on_lamps = [&](const test::LampsSeen& seen) { switches.push_back({paced.board_time(), seen.lit}); };
+    });
+    UsbLamps lamps(rig_of("LC-0001"));
+    ASSERT_NE(lamps.strobed(), nullptr);
+    const std::vector<StrobeStep> program{{LampId{0}}, {LampId{3}, 0.5}, {LampId{1}}, {}};
+    lamps.strobed()->arm(program, stepped);
+    std::vector<StrobeEvent> events;
+    EXPECT_TRUE(comes_true([&] {
+        for (const StrobeEvent& event : lamps.strobed()->take_events()) events.push_back(event);
+        return events.size() == program.size();
+    }));
+    EXPECT_EQ(lit(), 0U);
+    paced.with_board([&](EmulatedBoard& b, EmulatedHost&) { b.on_lamps = nullptr; });
+    ASSERT_EQ(events.size(), program.size());
+    std::vector<Switch> lights;  // the first moment of each light, and the last darkness
+    for (const Switch& s : switches)
+        if (s.lit != 0 && (lights.empty() || lights.back().lit != s.lit)) lights.push_back(s);
+    lights.push_back(switches.back());
+    ASSERT_EQ(lights.size(), program.size());
+    for (std::size_t i = 0; i < events.size(); ++i) {
+        EXPECT_EQ(events[i].step, i);
+        EXPECT_EQ(lights[i].lit, program[i].lamp ? bit(7 * program[i].lamp->value) : 0U);
+        EXPECT_GE(lights[i].when, events[i].moment.begin - 1ms) << i;
+        EXPECT_LE(lights[i].when, events[i].moment.end + 1ms) << i;
+        EXPECT_GE(phase(lights[i].when), up) << "the lamps changed while a frame was exposed";
+    }
+    EXPECT_THROW(lamps.arm({{LampId{0}}}, stepped), std::invalid_argument) << "it must end dark";
+    lamps.arm({{LampId{2}}, {}}, stepped);
+    lamps.light(LampId{4}, 1.0);  // ends the program
+    EXPECT_EQ(lit(), bit(28));
 }
 
 TEST_F(UsbLampsTest, AStrobeThatStaysOutIsTold) {

@@ -78,7 +78,7 @@ void StudyLamps::dark() {
     set(std::nullopt, clock_.now());
 }
 
-void StudyLamps::arm(const std::vector<StrobeStep>& program) {
+void StudyLamps::arm(const std::vector<StrobeStep>& program, Nanoseconds /*exposed*/) {
     dark();
     events_.clear();
     program_ = program;

@@ -77,7 +77,7 @@ public:
     void dark() override;
     LampHealth health() override { return {}; }
     StrobedLamps* strobed() override { return this; }
-    void arm(const std::vector<StrobeStep>& program) override;
+    void arm(const std::vector<StrobeStep>& program, Nanoseconds exposed) override;
     std::vector<StrobeEvent> take_events() override;
 
     void strobe(TimePoint moment);
