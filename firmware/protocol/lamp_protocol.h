@@ -22,7 +22,7 @@ constexpr uint8_t event_endpoint = 0x82;    ///< interrupt IN
 
 constexpr uint8_t largest_packet = 64;  ///< bytes; one packet is one command
 constexpr uint8_t most_lamps = 64;
-constexpr uint8_t most_steps = 64;
+constexpr uint8_t most_steps = 66;  ///< a dark one, one lamp twice, and the other lamps
 
 constexpr uint16_t shortest_heartbeat_ms = 50;
 constexpr uint16_t longest_heartbeat_ms = 1000;

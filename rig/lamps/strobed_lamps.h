@@ -26,7 +26,7 @@ struct StrobeEvent {
 /// Thread-compatible.
 class StrobedLamps {
 public:
-    static constexpr std::size_t longest_program = 64;  ///< steps
+    static constexpr std::size_t longest_program = 66;  ///< steps
 
     virtual ~StrobedLamps() = default;
     /// Takes over a program, whose last step is dark, and waits, dark, for the strobe. `exposed` is how long after its

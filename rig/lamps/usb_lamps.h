@@ -52,7 +52,7 @@ public:
     void arm(const std::vector<StrobeStep>& program, Nanoseconds exposed) override;
     std::vector<StrobeEvent> take_events() override;
 
-    /// Uploads the steps, at most 64, and starts them. The lamps are dark until the first begins, and after the last.
+    /// Uploads the steps, at most 66, and starts them. The lamps are dark until the first begins, and after the last.
     void run_program(const std::vector<LampStep>& steps, std::uint16_t rounds = 1);
     /// Waits for the next step to be over; none when the program is. Throws DeadlineError at the deadline, DeviceError
     /// when the board gave up: the strobe stayed out, a lamp's budget was used up, it was unplugged, events were lost.
