@@ -34,7 +34,8 @@ public:
         for (std::size_t i = 0; i < exposures_.size(); ++i) {
             const ExposureRows& e = exposures_[i];
             const double unlit = e.unlit(row, column / 3)[column % 3];
-            values_[i] = (e.sum(row, column / 3)[column % 3] / e.frames - unlit) * e.radiance;
+            const double sum = e.sum(row, column / 3)[column % 3];
+            values_[i] = (sum / e.frames - unlit) * e.radiance;
             used_[i] = e.clipped(row, column / 3)[column % 3] == 0;
         }
         clipped_ = !used_[shortest_];

@@ -57,7 +57,9 @@ cv::Mat3f UnlitFrames::level_for(const FrameRecord& lit) const {
     const auto begin = static_cast<double>(records_[place - 1].timestamp_ns);
     const double whole = static_cast<double>(records_[place].timestamp_ns) - begin;
     const double share = (static_cast<double>(lit.timestamp_ns) - begin) / whole;
-    return rows_[place - 1] * (1 - share) + rows_[place] * share;
+    cv::Mat3f between;
+    cv::addWeighted(rows_[place - 1], 1 - share, rows_[place], share, 0, between);
+    return between;
 }
 
 }  // namespace darkbox

@@ -40,17 +40,18 @@ void require_same_rig(const Session& old, const RigDescription& rig) {
     if (old.info().geometry != geometry_of(rig))
         refuse(old, "the rig's lamps, ball or camera stand elsewhere by its description");
     const RigDescription then = load_rig(old.path_of_extra("rig.toml"));
-    const bool same = std::ranges::equal(then.lamps, rig.lamps, [](const auto& a, const auto& b) {
-        return output_of(a) == output_of(b);
-    });
+    const bool same = std::ranges::equal(then.lamps, rig.lamps,
+                                         [](const auto& a, const auto& b) { return output_of(a) == output_of(b); });
     if (!same || then.lamps_driver != rig.lamps_driver) refuse(old, "the rig's lamps hang on other outputs");
-    if (then.capture.ambient != rig.capture.ambient) refuse(old, "it was captured with another `ambient` of [capture]");
+    const bool ambient = std::ranges::any_of(old.frames(), [](const auto& f) { return f.kind == FrameKind::ambient; });
+    if (ambient != rig.capture.ambient) refuse(old, "it was captured with another `ambient` of [capture]");
 }
 
 std::vector<std::string> unverified_lamps(const Session& old) {
     std::vector<std::string> names;
     for (const FrameRecord& record : old.frames())
-        if (record.kind == FrameKind::lit && !record.verified && std::ranges::find(names, record.lamp_name) == names.end())
+        if (record.kind == FrameKind::lit && !record.verified &&
+            std::ranges::find(names, record.lamp_name) == names.end())
             names.push_back(record.lamp_name);
     if (names.empty())
         throw InputError(fmt::format("every frame of {} was verified", old.folder().string()),
@@ -110,9 +111,11 @@ Retake plan_retake(const Session& old, const RigDescription& rig, const std::vec
     for (std::size_t i = 0; i < frames.size(); ++i) {
         const FrameRecord& record = frames[i];
         const auto same_part = [&](const FrameRecord& other) { return same_exposure(record, other); };
-        const bool first = i == 0 || !same_part(frames[i - 1]), last = i + 1 == frames.size() || !same_part(frames[i + 1]);
+        const bool first = i == 0 || !same_part(frames[i - 1]),
+                   last = i + 1 == frames.size() || !same_part(frames[i + 1]);
         const auto begin = std::find_if_not(std::make_reverse_iterator(frames.begin() + static_cast<std::ptrdiff_t>(i)),
-                                            frames.rend(), same_part).base();
+                                            frames.rend(), same_part)
+                               .base();
         const auto end = std::find_if_not(frames.begin() + static_cast<std::ptrdiff_t>(i), frames.end(), same_part);
         const bool touched = std::any_of(begin, end, is_retaken);
         if (is_retaken(record)) {
@@ -136,14 +139,15 @@ void require_same_camera(const Session& old, const CameraInfo& camera, const Cam
     const FrameRecord& then = old.frames().front();
     if (then.width != camera.width || then.height != camera.height || then.format != name(camera.format) ||
         then.bit_depth != camera.bit_depth || then.black_level != camera.black_level)
-        refuse(old, fmt::format("its frames are {}x{} {} of {} bits above {}, and the camera now delivers {}x{} {} of {} "
-                                "bits above {}",
-                                then.width, then.height, then.format, then.bit_depth, then.black_level, camera.width,
-                                camera.height, name(camera.format), camera.bit_depth, camera.black_level));
+        refuse(old,
+               fmt::format("its frames are {}x{} {} of {} bits above {}, and the camera now delivers {}x{} {} of {} "
+                           "bits above {}",
+                           then.width, then.height, then.format, then.bit_depth, then.black_level, camera.width,
+                           camera.height, name(camera.format), camera.bit_depth, camera.black_level));
     if (!near(camera.controls.exposure.count(), asked.exposure.count()) || !near(camera.controls.gain, asked.gain))
-        refuse(old, fmt::format("it was exposed for {} s at gain {}, and the camera now sets {} s at gain {}",
-                                asked.exposure.count(), asked.gain, camera.controls.exposure.count(),
-                                camera.controls.gain));
+        refuse(old,
+               fmt::format("it was exposed for {} s at gain {}, and the camera now sets {} s at gain {}",
+                           asked.exposure.count(), asked.gain, camera.controls.exposure.count(), camera.controls.gain));
 }
 
 }  // namespace darkbox

@@ -14,9 +14,9 @@
 namespace darkbox {
 namespace {
 
+using test::Twin;
 using testing::AllOf;
 using testing::HasSubstr;
-using test::Twin;
 
 /// The object's 99.9th percentile under its brightest lamp by the twin's own mask; samples above the black level.
 double level_of(const Session& session, const sim::Scene& scene) {
@@ -90,14 +90,15 @@ TEST(Metering, TakesWholePeriodsOfTheFlicker) {
 
 TEST(Metering, SaysWhenTheObjectIsTooDark) {
     Twin twin;
-    for (LampDescription& lamp : twin.rig.lamps) lamp.max_on = Seconds(0.030);
+    for (LampDescription& lamp : twin.rig.lamps) lamp.max_on = Seconds(0.205);
     twin.rig.camera.exposure = Seconds(0.001);
+    twin.rig.camera.gain = 0.05;
     try {
         twin.meter();
         FAIL();
     } catch (const InputError& error) {
         EXPECT_THAT(error.what(), AllOf(HasSubstr("too dark to be metered: under lamp 'lamp-0"),
-                                        HasSubstr("at the longest exposure that camera and lamps allow, 6.25 ms")));
+                                        HasSubstr("at the longest exposure that camera and lamps allow, 50 ms")));
         EXPECT_THAT(error.hint(), HasSubstr("raise gain"));
     }
     EXPECT_TRUE(twin.sim().lamps().all_dark());
@@ -110,8 +111,8 @@ TEST(Metering, SaysWhenTheObjectIsTooBright) {
         twin.meter();
         FAIL();
     } catch (const InputError& error) {
-        EXPECT_THAT(error.what(), AllOf(HasSubstr("too bright to be metered"), HasSubstr("shortest exposure"),
-                                        HasSubstr("0.02 ms")));
+        EXPECT_THAT(error.what(),
+                    AllOf(HasSubstr("too bright to be metered"), HasSubstr("shortest exposure"), HasSubstr("0.02 ms")));
     }
 }
 
