@@ -72,6 +72,7 @@ CameraInfo SimCamera::configure(const CameraConfig& config) {
     info.latency_frames = options_.latency_frames;
     info.readout = Seconds(0);
     info.controls = controls_;
+    info.exposure_range = {options_.shortest_exposure, options_.longest_exposure};
     period_ = to_nanoseconds(info.frame_period);
     return info;
 }
@@ -191,7 +192,11 @@ Frame SimCamera::deliver(const Exposure& e) {
 
 RgbImage SimCamera::light_of(const std::vector<LampShare>& burning) {
     RgbImage sum(scene_.view.width, scene_.view.height);
-    for (const LampShare& b : burning) {
+    std::vector<LampShare> lights = burning;
+    if (options_.room_light > 0)
+        for (std::uint32_t lamp = 0; lamp < scene_.lamps.size(); ++lamp)
+            lights.push_back({LampId{lamp}, options_.room_light});
+    for (const LampShare& b : lights) {
         const RgbImage& picture = picture_of(b.lamp);
         const auto share = static_cast<float>(b.share);
         for (std::size_t i = 0; i < sum.samples.size(); ++i) sum.samples[i] += share * picture.samples[i];

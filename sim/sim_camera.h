@@ -18,7 +18,10 @@ struct SimCameraOptions {
     int latency_frames = 1;  ///< exposures after start() that still have the controls from before configure()
     int queue_depth = 2;     ///< finished frames that wait; while the queue is full new ones are lost
     Seconds shortest_period{1.0 / 30};
+    Seconds shortest_exposure{20e-6};
+    Seconds longest_exposure{60};
     Seconds readout{0.004};  ///< from the end of the exposure to the finished frame
+    double room_light = 0;  ///< this share of every lamp's light is always there
     FaultPlan faults;
 };
 

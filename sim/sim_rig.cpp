@@ -49,6 +49,7 @@ SimRig SimRig::make(const RigDescription& rig, const FaultPlan& faults) {
     options.sensor = sensor_of(rig.sim);
     options.latency_frames = rig.sim.latency_frames;
     options.queue_depth = rig.sim.queue_depth;
+    options.room_light = rig.sim.room_light;
     options.faults = faults;
     if (!rig.sim.lamps_seen.empty()) result.seen_ = std::make_unique<SeenLamps>(rig);
     LampWitness& witness = result.seen_ ? static_cast<LampWitness&>(*result.seen_) : *result.lamps_;

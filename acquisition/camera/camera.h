@@ -31,6 +31,12 @@ struct CameraInfo {
     /// and frames' exposures are taken as long as they may be.
     std::optional<Seconds> readout;
     FrameControls controls;
+    /// The exposures that it can be set to; none: not known.
+    struct ExposureRange {
+        Seconds shortest{0};
+        Seconds longest{0};
+    };
+    std::optional<ExposureRange> exposure_range = {};
     std::vector<std::string> notes;  ///< what a session should keep of it besides, in words
 };
 

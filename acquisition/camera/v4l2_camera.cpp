@@ -116,6 +116,7 @@ CameraInfo V4l2Camera::describe(const v4l2_capability& capability, const Setup& 
     info.frame_period = setup.mode.frame_period;
     info.queue_depth = options_.buffers;
     info.controls = setup.controls.in_effect;
+    info.exposure_range = setup.controls.exposure_range;
     info.notes.push_back(fmt::format("camera: {} by {} at {}, {} of {} x {}, {:.3f} frames a second", info.model,
                                      text(capability.driver), text(capability.bus_info), fourcc_name(format.fourcc),
                                      width, height, 1.0 / info.frame_period.count()));

@@ -130,6 +130,7 @@ void set_exposure(VideoNode& node, Seconds exposure, SettledControls& settled) {
         settled.absent.emplace_back(exposure_control.name);
         return;
     }
+    settled.exposure_range = {range->minimum * exposure_unit, range->maximum * exposure_unit};
     const double steps = (exposure / exposure_unit - range->minimum) / std::max(range->step, 1);
     const double value = range->minimum + std::round(steps) * std::max(range->step, 1);
     if (value < range->minimum || value > range->maximum)

@@ -12,6 +12,7 @@ namespace darkbox {
 /// A camera's controls as settle_controls() left them.
 struct SettledControls {
     FrameControls in_effect;
+    std::optional<CameraInfo::ExposureRange> exposure_range = {};
     bool tells_exposure = true;  ///< false: it has no such control, and in_effect is not known to hold
     bool tells_gain = true;
     std::int32_t lowest_gain = 1;       ///< value of the camera's control at gain 1

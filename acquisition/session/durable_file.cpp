@@ -15,6 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::size_t largest_copy = std::size_t{4} << 30;
+
 fs::path parent_of(const fs::path& path) { return path.has_parent_path() ? path.parent_path() : fs::path("."); }
 
 void write_and_flush(const fs::path& file, std::span<const std::byte> bytes) {
@@ -56,6 +58,12 @@ void write_all(int fd, std::span<const std::byte> bytes, const fs::path& path) {
         if (count < 0) throw_errno("write", path.string(), errno);
         bytes = bytes.subspan(static_cast<std::size_t>(count));
     }
+}
+
+void link_or_copy_durably(const fs::path& file, const fs::path& target) {
+    if (::link(file.c_str(), target.c_str()) == 0) return flush_folder(parent_of(target));
+    if (errno == EEXIST) throw_errno("link", target.string(), errno);
+    write_durably(target, bytes_of(read_text(file, largest_copy)));
 }
 
 void flush_folder(const fs::path& folder) {

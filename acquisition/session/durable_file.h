@@ -26,6 +26,10 @@ void make_folder_durably(const std::filesystem::path& folder);
 /// Loops until all is written. `path` is for the message.
 void write_all(int fd, std::span<const std::byte> bytes, const std::filesystem::path& path);
 
+/// The file under a second name, its bytes shared where both are on one disk that has links, else copied. Bytes that
+/// are shared must not change any more: those of sealed sessions.
+void link_or_copy_durably(const std::filesystem::path& file, const std::filesystem::path& target);
+
 void flush_folder(const std::filesystem::path& folder);
 
 /// The whole of a regular file. Throws InputError when it is larger than `limit` bytes.

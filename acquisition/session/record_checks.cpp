@@ -137,6 +137,11 @@ void require_valid(const std::string& where, const SessionInfo& info) {
     require_between(where, "schema_version", info.schema_version, session_schema, session_schema);
     require_between(where, "planned_shots", info.planned_shots, 0, most_shots);
     if (info.geometry) require_valid(where, *info.geometry);
+    if (info.retakes) {
+        if (!is_good_component(info.retakes->name))
+            refuse(where, "retakes", shown(info.retakes->name), "the name of a session's folder");
+        require_sha256(where, info.retakes->manifest_sha256);
+    }
 }
 
 void require_valid(const std::string& where, const FrameRecord& record) {
@@ -151,6 +156,12 @@ void require_valid(const std::string& where, const FrameRecord& record) {
     require_finite(where, "black_level", record.black_level, 0);
     require_finite(where, "exposure_s", record.exposure_s, 0);
     require_finite(where, "gain", record.gain, 0);
+    if (record.noise) {
+        require_finite(where, "noise floor", record.noise->floor, 0);
+        require_finite(where, "noise slope", record.noise->slope, 0);
+    }
+    if (!record.taken_over_from.empty() && !is_good_component(record.taken_over_from))
+        refuse(where, "taken_over_from", shown(record.taken_over_from), "the name of a session's folder");
 }
 
 }  // namespace darkbox

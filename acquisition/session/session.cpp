@@ -12,6 +12,7 @@
 #include "acquisition/session/journal.h"
 #include "acquisition/session/record_checks.h"
 #include "acquisition/session/session_json.h"
+#include "acquisition/session/sha256.h"
 
 namespace darkbox {
 namespace {
@@ -125,6 +126,11 @@ Session Session::open(const fs::path& folder) {
 
 fs::path Session::path_of(const FrameRecord& frame) const { return folder_ / "data" / frame.file; }
 fs::path Session::path_of_extra(const std::string& extra) const { return folder_ / "data" / extra; }
+
+SessionReference Session::reference() const {
+    const fs::path plain = folder_.has_filename() ? folder_ : folder_.parent_path();
+    return {plain.filename().string(), sha256_of_file(folder_ / manifest_name)};
+}
 
 void Session::verify() const {
     const std::vector<std::string> faults = find_bag_faults(folder_);

@@ -26,6 +26,23 @@ std::optional<TransferCurve> transfer_curve_from_name(std::string_view name);
 /// The time of day in UTC to the millisecond: "2026-01-31T23:59:59.999Z".
 std::string iso8601_now();
 
+/// What a sensor's noise came to: variance = floor + slope · signal, in squared sample units; signal is above the frame
+/// without a lamp.
+struct SensorNoise {
+    double floor = 0.0;
+    double slope = 0.0;
+
+    friend bool operator==(const SensorNoise&, const SensorNoise&) = default;
+};
+
+/// Another session, by its name and by what it holds.
+struct SessionReference {
+    std::string name;             ///< of its folder
+    std::string manifest_sha256;  ///< of its payload manifest, so of every byte in it
+
+    friend bool operator==(const SessionReference&, const SessionReference&) = default;
+};
+
 /// One frame as the manifest (session.json) describes it. Times are nanoseconds on the capture's clock; imported
 /// pictures have none.
 struct FrameRecord {
@@ -48,6 +65,8 @@ struct FrameRecord {
     bool verified = false;
     std::string verification;  ///< what was checked and found, in words
     std::string sha256;        ///< of the file, lower-case hex; filled by SessionWriter
+    std::optional<SensorNoise> noise = {};  ///< of captured frames, where it was measured
+    std::string taken_over_from = {};       ///< the session that it was captured in; empty: this one
 
     friend bool operator==(const FrameRecord&, const FrameRecord&) = default;
 };
@@ -89,6 +108,7 @@ struct SessionInfo {
     int planned_shots = 0;           ///< frames the session needs to be complete
     std::vector<std::string> notes;  ///< choices made on the way in, such as the transfer curve, in words
     std::optional<CaptureGeometry> geometry = {};
+    std::optional<SessionReference> retakes = {};  ///< the session of which this one takes some lamps again
 };
 
 /// A sealed session, read only. Thread-compatible; const members are thread-safe.
@@ -104,6 +124,8 @@ public:
     const std::vector<SessionEvent>& events() const { return events_; }
 
     std::filesystem::path path_of(const FrameRecord& frame) const;
+    /// What another session says to refer to this one.
+    SessionReference reference() const;
     /// Masks and given light files ("masks/mask.png", "given/lights.lp"), relative to data/, sorted.
     const std::vector<std::string>& extras() const { return extras_; }
     std::filesystem::path path_of_extra(const std::string& extra) const;

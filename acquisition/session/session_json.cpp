@@ -141,13 +141,15 @@ Json json_of(const SessionInfo& info) {
               {"rig", info.rig},       {"camera", info.camera},   {"planned_shots", info.planned_shots},
               {"notes", info.notes}};
     if (info.geometry) json["geometry"] = json_of(*info.geometry);
+    if (info.retakes)
+        json["retakes"] = {{"session", info.retakes->name}, {"manifest_sha256", info.retakes->manifest_sha256}};
     return json;
 }
 
 Json json_of(const SessionEvent& event) { return {{"when", event.when}, {"what", event.what}}; }
 
 Json json_of(const FrameRecord& record) {
-    return {{"file", record.file},
+    Json json{{"file", record.file},
             {"kind", name(record.kind)},
             {"format", record.format},
             {"width", record.width},
@@ -166,6 +168,9 @@ Json json_of(const FrameRecord& record) {
             {"verified", record.verified},
             {"verification", record.verification},
             {"sha256", record.sha256}};
+    if (record.noise) json["noise"] = {{"floor", record.noise->floor}, {"slope", record.noise->slope}};
+    if (!record.taken_over_from.empty()) json["taken_over_from"] = record.taken_over_from;
+    return json;
 }
 
 int known_schema(const Fields& fields) {
@@ -207,6 +212,10 @@ SessionInfo info_from(const Fields& fields) {
         info.notes.push_back(note.get<std::string>());
     }
     if (fields.has("geometry")) info.geometry = geometry_from({fields.where(), fields.member("geometry")});
+    if (fields.has("retakes")) {
+        const Fields reference(fields.where(), fields.member("retakes"));
+        info.retakes = {reference.text("session"), reference.text("manifest_sha256")};
+    }
     require_valid(fields.where(), info);
     return info;
 }
@@ -234,6 +243,11 @@ FrameRecord record_from(const Fields& fields) {
     record.verified = fields.flag("verified");
     record.verification = fields.text("verification");
     record.sha256 = fields.text("sha256");
+    if (fields.has("noise")) {
+        const Fields noise(fields.where(), fields.member("noise"));
+        record.noise = {noise.number("floor"), noise.number("slope")};
+    }
+    if (fields.has("taken_over_from")) record.taken_over_from = fields.text("taken_over_from");
     require_valid(fields.where(), record);
     require_sha256(fields.where(), record.sha256);
     return record;

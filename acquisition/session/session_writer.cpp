@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <unordered_map>
 #include <utility>
 
 #include "acquisition/device/device_error.h"
@@ -71,6 +72,16 @@ void require_intact(const fs::path& folder, const Payload& payload) {
     if (!fs::exists(file)) refuse("is missing");
     if (fs::file_size(file) != payload.size) refuse("has the wrong size");
     if (sha256_of_file(file) != payload.sha256) refuse("does not match its checksum");
+}
+
+void put_in_order(std::vector<FrameRecord>& frames, const std::vector<std::string>& order) {
+    std::unordered_map<std::string, std::size_t> places;
+    for (const std::string& name : order) places.emplace(name, places.size());
+    const auto place = [&](const FrameRecord& record) {
+        const auto found = places.find(record.file);
+        return found == places.end() ? order.size() : found->second;
+    };
+    std::ranges::stable_sort(frames, {}, place);
 }
 
 /// Housekeeping after the seal, all of it optional: the bag is complete without.
@@ -198,6 +209,22 @@ void SessionWriter::add(std::span<const std::byte> bytes, FrameRecord record) {
     state_->add_payload(file, bytes, FrameEntry{std::move(record), bytes.size()});
 }
 
+void SessionWriter::take_over(const fs::path& file, const FrameRecord& record) {
+    state_->require_open();
+    require_valid(state_->folder.string(), record);
+    require_sha256(file.string(), record.sha256);
+    if (sha256_of_file(file) != record.sha256)
+        throw InputError(fmt::format("{} does not match its checksum", file.string()),
+                         "the session that it is taken from is damaged: darkbox verify tells more");
+    if (state_->contents.holds(record.file))
+        throw InputError(fmt::format("{} holds {} already", state_->folder.string(), shown(record.file)),
+                         "nothing in a session is ever replaced");
+    const fs::path target = state_->folder / "data" / record.file;
+    make_folder_durably(target.parent_path());
+    link_or_copy_durably(file, target);
+    state_->acknowledge(FrameEntry{record, fs::file_size(target)});
+}
+
 void SessionWriter::add_extra(const std::string& name, std::span<const std::byte> bytes) {
     state_->require_open();
     require_payload_name(state_->folder.string(), name);
@@ -207,7 +234,7 @@ void SessionWriter::add_extra(const std::string& name, std::span<const std::byte
 void SessionWriter::note_event(const std::string& what) { state_->acknowledge(SessionEvent{iso8601_now(), what}); }
 void SessionWriter::add_note(const std::string& note) { state_->acknowledge(NoteEntry{note}); }
 
-Session SessionWriter::seal() {
+Session SessionWriter::seal(const std::vector<std::string>& order) {
     state_->require_open();
     const SessionContents& contents = state_->contents;
     const fs::path& folder = state_->folder;
@@ -216,6 +243,7 @@ Session SessionWriter::seal() {
                                      contents.info.planned_shots),
                          fmt::format("take the missing ones: darkbox capture --resume {}", folder.string()));
     remove_unacknowledged(folder, contents);
+    put_in_order(state_->contents.frames, order);
     try {
         write_bag(folder, contents);
     } catch (...) {

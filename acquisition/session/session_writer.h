@@ -40,14 +40,18 @@ public:
     void add(const Frame& frame, FrameRecord record);
     /// A picture kept as its bytes; `record.file` names it ("frames/cat.00.png").
     void add(std::span<const std::byte> bytes, FrameRecord record);
+    /// A frame of a sealed session, `file`, under the same record: linked where the disk allows it, else copied. Throws
+    /// InputError when the file is not what the record's checksum says.
+    void take_over(const std::filesystem::path& file, const FrameRecord& record);
     /// Any other payload: masks, given lights, rig.toml. `name` is relative to data/, without "..".
     void add_extra(const std::string& name, std::span<const std::byte> bytes);
     void note_event(const std::string& what);
     void add_note(const std::string& note);
 
     /// Writes session.json and the BagIt manifests, flushes, removes the journal. The session is read-only afterwards.
+    /// `order`: names of frames in the order in which the manifest is to have them; others come after, as acknowledged.
     /// Throws InputError when fewer frames are there than planned.
-    Session seal();
+    Session seal(const std::vector<std::string>& order = {});
 
 private:
     struct State;

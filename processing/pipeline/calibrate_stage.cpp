@@ -232,7 +232,7 @@ void warn_of_few_lights(Calibration& calibration) {
 CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& options, const WorkContext& work) {
     options.calibration.validate();
     const ResultFiles files(session.folder());
-    const std::vector<FrameRecord> lit = frames_of_kind(session, FrameKind::lit);
+    const std::vector<FrameRecord> lit = photographs_of(session, FrameKind::lit);
     CalibrateSummary summary;
     Stopwatch watch;
     const bool ball_asked_for = !options.calibration.balls.empty() || options.ball_mask;

@@ -36,7 +36,7 @@ cv::Mat sixteen_bit(const cv::Mat3f& image, double scale) {
 /// All lit photographs in order, a few of them in memory at a time: `body(index, radiance)`.
 template <class Body>
 void for_each_photograph(const Session& session, const char* stage, const WorkContext& work, Body body) {
-    const std::vector<FrameRecord> frames = frames_of_kind(session, FrameKind::lit);
+    const std::vector<FrameRecord> frames = photographs_of(session, FrameKind::lit);
     for (std::size_t first = 0; first < frames.size(); first += photographs_at_once) {
         const std::size_t last = std::min(first + photographs_at_once, frames.size());
         step(work, {stage, first, frames.size(), basename_of(frames[first])});
@@ -48,7 +48,7 @@ void for_each_photograph(const Session& session, const char* stage, const WorkCo
 }
 
 void require_light_for_each(const Session& session, const Lights& lights) {
-    const std::size_t frames = frames_of_kind(session, FrameKind::lit).size();
+    const std::size_t frames = photographs_of(session, FrameKind::lit).size();
     if (frames != lights.size())
         throw InputError(
             fmt::format("{} has {} lit frames but {} lights", session.folder().string(), frames, lights.size()),
@@ -108,7 +108,7 @@ Ptm fitted_band(const PhotoBand& band, const Lights& lights, PtmModel model, con
 /// rgb.
 Ptm fitted_ptm(const Session& session, const Lights& lights, PtmModel model, const WorkContext& work) {
     require_light_for_each(session, lights);
-    FrameBands frames(session, frames_of_kind(session, FrameKind::lit));
+    FrameBands frames(session, photographs_of(session, FrameKind::lit));
     const cv::Size size = frames.size();
     const int most_rows = static_cast<int>(std::max<std::size_t>(1, band_bytes / frames.bytes_per_row()));
     Ptm whole{model, {}, {}};

@@ -64,7 +64,7 @@ std::optional<GivenLights> given_lights(const Session& session) {
     if (!path) path = extra_of(session, given_plain_lights);
     if (!path) return std::nullopt;
     std::vector<std::string> own_names, files;
-    for (const FrameRecord& frame : frames_of_kind(session, FrameKind::lit)) {
+    for (const FrameRecord& frame : photographs_of(session, FrameKind::lit)) {
         own_names.push_back(frame.lamp_name);
         files.push_back(basename_of(frame));
     }

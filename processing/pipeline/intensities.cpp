@@ -29,7 +29,7 @@ struct PlaneFrames {
 
 PlaneFrames read_plane(const Session& session, FrameKind kind, const WorkContext& work) {
     PlaneFrames plane;
-    for (Radiance& radiance : read_radiances(session, frames_of_kind(session, kind), work)) {
+    for (Radiance& radiance : read_radiances(session, photographs_of(session, kind), work)) {
         plane.frames.push_back(std::move(radiance.image));
         plane.clipped.push_back(std::move(radiance.clipped));
     }
@@ -76,7 +76,7 @@ ChosenIntensities adopted(Calibration calibration, SemiCalibratedResult result) 
 
 Calibration with_measured_intensities(const Session& session, Calibration calibration,
                                       const std::optional<GreyCard>& card, const WorkContext& work) {
-    const bool flats = frames_of_kind(session, FrameKind::flat).size() == calibration.lights.size();
+    const bool flats = photographs_of(session, FrameKind::flat).size() == calibration.lights.size();
     if (!card && (!flats || calibration.intensity_origin != IntensityOrigin::unknown)) return calibration;
     const PlaneFrames plane = read_plane(session, card ? FrameKind::lit : FrameKind::flat, work);
     GreyCard area = card ? *card : middle_of(plane.frames.front().size());

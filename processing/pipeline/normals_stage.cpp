@@ -50,7 +50,7 @@ std::optional<double> error_against_truth(const Session& session, const NormalMa
 
 /// The curve of 8-bit imports: the one choice that the pictures themselves can contradict.
 std::optional<TransferCurve> doubtful_curve(const Session& session) {
-    const auto lit = frames_of_kind(session, FrameKind::lit);
+    const auto lit = photographs_of(session, FrameKind::lit);
     const bool doubtful = session.info().source == "import" && !lit.empty() &&
                           std::all_of(lit.begin(), lit.end(), [&](const FrameRecord& frame) {
                               return frame.bit_depth == 8 && frame.transfer == lit.front().transfer;

@@ -12,21 +12,17 @@
 #include "processing/maps/parallel.h"
 #include "processing/maps/srgb.h"
 #include "processing/pipeline/frame_rows.h"
+#include "processing/pipeline/merge_exposures.h"
 #include "processing/pipeline/open_files.h"
 #include "processing/pipeline/session_files.h"
 #include "processing/pipeline/steps.h"
+#include "processing/pipeline/unlit_frames.h"
 
 namespace darkbox {
 namespace {
 
 constexpr int rows_at_once = 64;
 constexpr std::size_t libraries_files = 64;  // what else may be open
-
-/// Exposure and gain: what a lamps-off frame must share with the frame that it is taken from.
-bool same_controls(const FrameRecord& a, const FrameRecord& b) {
-    const auto near = [](double p, double q) { return std::abs(p - q) <= 1e-6 * std::max(std::abs(p), std::abs(q)); };
-    return near(a.exposure_s, b.exposure_s) && near(a.gain, b.gain) && a.width == b.width && a.height == b.height;
-}
 
 }  // namespace
 
@@ -37,46 +33,21 @@ std::shared_ptr<const std::vector<float>> srgb_curve(int full_scale) {
     return std::make_shared<const std::vector<float>>(std::move(curve));
 }
 
-/// The mean of the lamps-off frames of one exposure and gain, row by row.
-class FrameBands::Dark {
+namespace {
+
+double full_scale_of(const FrameRecord& record) { return std::exp2(record.bit_depth) - 1.0; }
+
+/// One frame and what makes radiance of its samples.
+class PlainPhoto final : public PhotoReader {
 public:
-    Dark(const Session& session, const FrameRecord& like) : like_(like) {
-        for (const FrameRecord& dark : frames_of_kind(session, FrameKind::dark))
-            if (is_captured(dark) && same_controls(dark, like)) frames_.push_back(open_frame_rows(session, dark));
-    }
-
-    bool fits(const FrameRecord& frame) const { return same_controls(like_, frame); }
-    bool empty() const { return frames_.empty(); }
-
-    /// In sample units.
-    void read_next(int rows, cv::Size size) {
-        mean_ = cv::Mat3f(rows, size.width, cv::Vec3f::all(0));
-        cv::Mat samples, wide;
-        for (const auto& frame : frames_) {
-            frame->read(rows, samples);
-            samples.convertTo(wide, CV_32F);
-            mean_ += wide;
-        }
-        mean_ /= static_cast<double>(frames_.size());
-    }
-    const cv::Mat3f& mean() const { return mean_; }
-
-private:
-    FrameRecord like_;
-    std::vector<std::unique_ptr<FrameRows>> frames_;
-    cv::Mat3f mean_;
-};
-
-/// One photograph and what makes radiance of its samples.
-class FrameBands::Frame {
-public:
-    Frame(const Session& session, const FrameRecord& record, const Dark* dark)
-        : rows_(open_frame_rows(session, record)), dark_(dark), srgb_(record.transfer == TransferCurve::srgb) {
+    PlainPhoto(const Session& session, const FrameRecord& record, const UnlitFrames* unlit)
+        : rows_(open_frame_rows(session, record)),
+          record_(record),
+          unlit_(unlit),
+          srgb_(record.transfer == TransferCurve::srgb) {
         const int depth = CV_MAT_DEPTH(rows_->type());
         if (depth == CV_32F) return;
-        const double full_scale = is_captured(record) ? std::exp2(record.bit_depth) - 1.0
-                                  : depth == CV_8U    ? 255
-                                                      : 65535;
+        const double full_scale = is_captured(record) ? full_scale_of(record) : depth == CV_8U ? 255 : 65535;
         const double black = is_captured(record) ? record.black_level : 0.0;
         form_.black = static_cast<float>(black);
         form_.scale = static_cast<float>(1.0 / (full_scale - black));
@@ -84,61 +55,156 @@ public:
         if (srgb_ && !is_captured(record)) form_.curve = srgb_curve(static_cast<int>(full_scale));
     }
 
-    cv::Size size() const { return rows_->size(); }
-    std::size_t bytes_per_pixel() const { return CV_ELEM_SIZE(rows_->type()); }
+    cv::Size size() const override { return rows_->size(); }
+    std::size_t bytes_per_pixel() const override { return CV_ELEM_SIZE(rows_->type()); }
 
-    void read_next(int rows, PhotoRows& photo) {
+    void read_next(int rows, PhotoRows& photo) override {
         cv::Mat samples = std::move(photo.samples);
         rows_->read(rows, samples);
         photo = form_;
         photo.samples = std::move(samples);
-        if (dark_) photo.dark = dark_->mean();
+        if (unlit_) photo.dark = unlit_->level_for(record_);
         if (srgb_ && photo.samples.depth() == CV_32F) photo.samples = linear_from_srgb(cv::Mat3f(photo.samples));
     }
 
 private:
     std::unique_ptr<FrameRows> rows_;
-    const Dark* dark_;
+    FrameRecord record_;
+    const UnlitFrames* unlit_;
     bool srgb_;
     PhotoRows form_;  ///< without samples
 };
 
-FrameBands::FrameBands(const Session& session, const std::vector<FrameRecord>& frames) {
-    allow_open_files(frames.size() + libraries_files);
-    for (const FrameRecord& record : frames) {
-        const Dark* dark = is_captured(record) ? dark_for(session, record) : nullptr;
-        frames_.push_back(std::make_unique<Frame>(session, record, dark));
-        const cv::Size size = frames_.back()->size();
-        if (frames_.size() == 1) size_ = size;
+/// Frames of one lamp, at one exposure or several, as one photograph.
+class MergedPhoto final : public PhotoReader {
+public:
+    /// `unlit`: those of each frame; null where there are none.
+    MergedPhoto(const Session& session, const std::vector<FrameRecord>& frames,
+                const std::vector<const UnlitFrames*>& unlit)
+        : gauge_(frames.front()) {
+        for (std::size_t i = 0; i < frames.size(); ++i) {
+            const auto same = [&](const Exposure& e) { return same_controls(e.frames.front().record, frames[i]); };
+            auto known = std::find_if(exposures_.begin(), exposures_.end(), same);
+            if (known == exposures_.end()) known = exposures_.emplace(exposures_.end());
+            known->frames.push_back({frames[i], open_frame_rows(session, frames[i]), unlit[i]});
+        }
+    }
+
+    cv::Size size() const override { return exposures_.front().frames.front().rows->size(); }
+    std::size_t bytes_per_pixel() const override {
+        return exposures_.size() * (2 * sizeof(cv::Vec3f) + sizeof(cv::Vec3b)) + 4 * sizeof(cv::Vec3f);
+    }
+
+    void read_next(int rows, PhotoRows& photo) override {
+        std::vector<ExposureRows> read;
+        for (const Exposure& exposure : exposures_) read.push_back(read_exposure(exposure, rows));
+        MergedRows merged = merge_exposures(read);
+        photo = PhotoRows();
+        photo.samples = std::move(merged.radiance);
+        photo.clipped = std::move(merged.clipped);
+    }
+
+private:
+    struct OneFrame {
+        FrameRecord record;
+        std::unique_ptr<FrameRows> rows;
+        const UnlitFrames* unlit = nullptr;
+    };
+    struct Exposure {
+        std::vector<OneFrame> frames;
+    };
+
+    ExposureRows read_exposure(const Exposure& exposure, int count) const {
+        const FrameRecord& first = exposure.frames.front().record;
+        const cv::Size size(this->size().width, count);
+        ExposureRows rows{.sum = cv::Mat3f(size, cv::Vec3f::all(0)),
+                          .unlit = cv::Mat3f(size, cv::Vec3f::all(0)),
+                          .clipped = cv::Mat3b(size, cv::Vec3b::all(0)),
+                          .frames = static_cast<int>(exposure.frames.size()),
+                          .unlit_frames = 0,
+                          .full_scale = full_scale_of(first),
+                          .radiance = 1,
+                          .noise = first.noise.value_or(SensorNoise{})};
+        const double sensitivity = first.exposure_s * first.gain / (gauge_.exposure_s * gauge_.gain);
+        rows.radiance = 1 / ((rows.full_scale - first.black_level) * sensitivity);
+        cv::Mat samples, wide;
+        for (const OneFrame& frame : exposure.frames) {
+            frame.rows->read(count, samples);
+            samples.convertTo(wide, CV_32F);
+            rows.sum += wide;
+            mark_clipped(wide, rows);
+            if (frame.unlit) {
+                rows.unlit += frame.unlit->level_for(frame.record);
+                rows.unlit_frames = frame.unlit->count();
+            } else {
+                rows.unlit += cv::Scalar::all(frame.record.black_level);
+            }
+        }
+        rows.unlit /= static_cast<double>(exposure.frames.size());
+        return rows;
+    }
+
+    static void mark_clipped(const cv::Mat& samples, ExposureRows& rows) {
+        for (int row = 0; row < samples.rows; ++row) {
+            const auto* sample = samples.ptr<float>(row);
+            uchar* clipped = rows.clipped.ptr(row);
+            for (int i = 0; i < 3 * samples.cols; ++i)
+                if (sample[i] >= rows.full_scale) clipped[i] = 255;
+        }
+    }
+
+    FrameRecord gauge_;  ///< in whose exposure and gain radiance 1 is full scale
+    std::vector<Exposure> exposures_;
+};
+
+}  // namespace
+
+FrameBands::FrameBands(const Session& session, const std::vector<FrameRecord>& photographs) {
+    allow_open_files(photographs.size() + libraries_files);
+    for (const FrameRecord& photograph : photographs) {
+        photos_.push_back(open(session, photograph));
+        const cv::Size size = photos_.back()->size();
+        if (photos_.size() == 1) size_ = size;
         if (size != size_)
-            throw InputError(fmt::format("{} is {}x{} pixels but {} is {}x{}", record.file, size.width, size.height,
-                                         frames.front().file, size_.width, size_.height),
-                             "give photographs of one camera in one place, all of one size");
+            throw InputError(
+                fmt::format("{} is {}x{} pixels but {} is {}x{}", photograph.file, size.width, size.height,
+                            photographs.front().file, size_.width, size_.height),
+                "give photographs of one camera in one place, all of one size");
     }
 }
 
 FrameBands::~FrameBands() = default;
 
-FrameBands::Dark* FrameBands::dark_for(const Session& session, const FrameRecord& frame) {
-    auto known = std::find_if(darks_.begin(), darks_.end(), [&](const auto& dark) { return dark->fits(frame); });
-    if (known == darks_.end()) known = darks_.insert(darks_.end(), std::make_unique<Dark>(session, frame));
+std::unique_ptr<PhotoReader> FrameBands::open(const Session& session, const FrameRecord& photograph) {
+    if (!is_captured(photograph)) return std::make_unique<PlainPhoto>(session, photograph, nullptr);
+    const std::vector<FrameRecord> frames = frames_of_photograph(session, photograph);
+    if (frames.size() == 1) return std::make_unique<PlainPhoto>(session, photograph, unlit_for(session, photograph));
+    std::vector<const UnlitFrames*> unlit;
+    for (const FrameRecord& frame : frames) unlit.push_back(unlit_for(session, frame));
+    return std::make_unique<MergedPhoto>(session, frames, unlit);
+}
+
+const UnlitFrames* FrameBands::unlit_for(const Session& session, const FrameRecord& frame) {
+    auto known = std::find_if(unlit_.begin(), unlit_.end(), [&](const auto& unlit) { return unlit->fits(frame); });
+    if (known == unlit_.end()) known = unlit_.insert(unlit_.end(), std::make_unique<UnlitFrames>(session, frame));
     return (*known)->empty() ? nullptr : known->get();
 }
 
 std::size_t FrameBands::bytes_per_row() const {
-    std::size_t bytes_per_pixel = darks_.size() * sizeof(cv::Vec3f);
-    for (const auto& frame : frames_) bytes_per_pixel += frame->bytes_per_pixel();
+    std::size_t bytes_per_pixel = 0;
+    for (const auto& unlit : unlit_) bytes_per_pixel += unlit->bytes_per_pixel();
+    for (const auto& photo : photos_) bytes_per_pixel += photo->bytes_per_pixel();
     return bytes_per_pixel * static_cast<std::size_t>(size_.width);
 }
 
 void FrameBands::read_next(int rows, PhotoBand& band) {
     band.first_row = next_row_;
-    band.photos.resize(frames_.size());
-    tbb::parallel_for(std::size_t{0}, darks_.size(), [&](std::size_t i) {
-        if (!darks_[i]->empty()) darks_[i]->read_next(rows, size_);
+    band.photos.resize(photos_.size());
+    tbb::parallel_for(std::size_t{0}, unlit_.size(), [&](std::size_t i) {
+        if (!unlit_[i]->empty()) unlit_[i]->read_next(rows, size_);
     });
-    tbb::parallel_for(std::size_t{0}, frames_.size(),
-                      [&](std::size_t i) { frames_[i]->read_next(rows, band.photos[i]); });
+    tbb::parallel_for(std::size_t{0}, photos_.size(),
+                      [&](std::size_t i) { photos_[i]->read_next(rows, band.photos[i]); });
     next_row_ += rows;
 }
 

@@ -10,31 +10,42 @@
 
 namespace darkbox {
 
-/// Frames of a session, captured or imported, read together from the top. They come as they were decoded, with what
-/// makes radiance of them: each frame's transfer curve, and the mean lamps-off frame of the same exposure and gain
-/// where the session has one (it holds the black level already), else the black level. 1.0 = full scale after the black
-/// level. Thread-compatible.
+class UnlitFrames;
+
+/// One photograph, read from the top. Thread-compatible.
+class PhotoReader {
+public:
+    virtual ~PhotoReader() = default;
+    virtual cv::Size size() const = 0;
+    virtual std::size_t bytes_per_pixel() const = 0;
+    /// The next rows.
+    virtual void read_next(int rows, PhotoRows& photo) = 0;
+};
+
+/// Photographs of a session, captured or imported, read together from the top. They come as they were decoded, with what
+/// makes radiance of them: each frame's transfer curve, and what stood there without a lamp where the session has frames
+/// of that (see unlit_frames.h; they hold the black level already), else the black level. Several frames of one lamp are
+/// merged. 1.0 = full scale after the black level, of merged ones in the first frame's exposure. Thread-compatible.
 class FrameBands {
 public:
     /// Opens every file. Throws InputError for one that cannot be read, or is of another size than the first.
-    FrameBands(const Session& session, const std::vector<FrameRecord>& frames);
+    FrameBands(const Session& session, const std::vector<FrameRecord>& photographs);
     ~FrameBands();
 
     cv::Size size() const { return size_; }
-    std::size_t count() const { return frames_.size(); }
+    std::size_t count() const { return photos_.size(); }
     /// Memory of one row in a band.
     std::size_t bytes_per_row() const;
-    /// The next rows of every frame; files are read in parallel. The band's mask is left alone.
+    /// The next rows of every photograph; files are read in parallel. The band's mask is left alone.
     void read_next(int rows, PhotoBand& band);
 
 private:
-    class Frame;
-    class Dark;
-    Dark* dark_for(const Session& session, const FrameRecord& frame);
+    std::unique_ptr<PhotoReader> open(const Session& session, const FrameRecord& photograph);
+    const UnlitFrames* unlit_for(const Session& session, const FrameRecord& frame);
 
     cv::Size size_;
-    std::vector<std::unique_ptr<Dark>> darks_;
-    std::vector<std::unique_ptr<Frame>> frames_;
+    std::vector<std::unique_ptr<UnlitFrames>> unlit_;
+    std::vector<std::unique_ptr<PhotoReader>> photos_;
     int next_row_ = 0;
 };
 

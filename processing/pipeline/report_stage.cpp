@@ -37,7 +37,7 @@ std::string controls_of(const std::vector<FrameRecord>& lit) {
 
 void add_facts(const Session& session, ReportContent& content) {
     const SessionInfo& info = session.info();
-    const auto lit = frames_of_kind(session, FrameKind::lit);
+    const auto lit = photographs_of(session, FrameKind::lit);
     content.facts = {{"Object", info.object}, {"Taken", info.created}, {"Source", info.source}};
     if (!info.rig.empty()) content.facts.emplace_back("Rig", info.rig);
     if (!info.camera.empty()) content.facts.emplace_back("Camera", info.camera);

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "acquisition/frame/error.h"
+#include "acquisition/frame/pixel_format.h"
 
 namespace darkbox {
 
@@ -52,6 +54,37 @@ std::vector<FrameRecord> frames_of_kind(const Session& session, FrameKind kind) 
     std::copy_if(session.frames().begin(), session.frames().end(), std::back_inserter(frames),
                  [kind](const FrameRecord& frame) { return frame.kind == kind; });
     return frames;
+}
+
+namespace {
+
+bool of_one_photograph(const FrameRecord& a, const FrameRecord& b) {
+    return a.kind == b.kind && a.lamp && a.lamp == b.lamp && a.lamp_name == b.lamp_name &&
+           pixel_format_from_name(a.format) && a.format == b.format;
+}
+
+}  // namespace
+
+std::vector<FrameRecord> photographs_of(const Session& session, FrameKind kind) {
+    std::vector<FrameRecord> photographs;
+    for (const FrameRecord& frame : session.frames()) {
+        const auto same = [&](const FrameRecord& earlier) { return of_one_photograph(earlier, frame); };
+        if (frame.kind == kind && std::none_of(photographs.begin(), photographs.end(), same))
+            photographs.push_back(frame);
+    }
+    return photographs;
+}
+
+std::vector<FrameRecord> frames_of_photograph(const Session& session, const FrameRecord& photograph) {
+    std::vector<FrameRecord> frames;
+    for (const FrameRecord& frame : session.frames())
+        if (frame.file == photograph.file || of_one_photograph(photograph, frame)) frames.push_back(frame);
+    return frames;
+}
+
+bool same_controls(const FrameRecord& a, const FrameRecord& b) {
+    const auto near = [](double p, double q) { return std::abs(p - q) <= 1e-6 * std::max(std::abs(p), std::abs(q)); };
+    return near(a.exposure_s, b.exposure_s) && near(a.gain, b.gain) && a.width == b.width && a.height == b.height;
 }
 
 std::string basename_of(const FrameRecord& frame) { return fs::path(frame.file).filename().string(); }

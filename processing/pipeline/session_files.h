@@ -36,6 +36,14 @@ void require_made(const std::filesystem::path& file, const Session& session, con
 /// Returns the folders that were there.
 std::vector<std::string> remove_derived(const Session& session, const std::vector<std::string>& folders);
 
+/// One frame for each photograph: where a captured session has several of one lamp (averages, brackets), the first of
+/// them stands for all; see merge_exposures.h.
+std::vector<FrameRecord> photographs_of(const Session& session, FrameKind kind);
+/// All frames of the photograph that this one stands for, itself included.
+std::vector<FrameRecord> frames_of_photograph(const Session& session, const FrameRecord& photograph);
+/// Exposure, gain and size.
+bool same_controls(const FrameRecord& a, const FrameRecord& b);
+
 std::vector<FrameRecord> frames_of_kind(const Session& session, FrameKind kind);
 std::string basename_of(const FrameRecord& frame);
 /// The path of a mask or given file where the session has it.

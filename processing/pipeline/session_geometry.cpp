@@ -52,7 +52,7 @@ CalibrationOptions with_geometry(const Session& session, CalibrationOptions opti
     if (!options.ball_diameter_mm) options.ball_diameter_mm = geometry->ball_diameter_mm;
     if (options.lamps == LampModel::automatic && geometry->distant_lamps) options.lamps = LampModel::distant;
     if (!options.nominal && options.lamps != LampModel::distant)
-        options.nominal = nominal_of(*geometry, frames_of_kind(session, FrameKind::lit));
+        options.nominal = nominal_of(*geometry, photographs_of(session, FrameKind::lit));
     return options;
 }
 

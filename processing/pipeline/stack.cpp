@@ -18,7 +18,7 @@ namespace darkbox {
 namespace {
 
 std::vector<FrameRecord> require_lit(const Session& session) {
-    std::vector<FrameRecord> lit = frames_of_kind(session, FrameKind::lit);
+    std::vector<FrameRecord> lit = photographs_of(session, FrameKind::lit);
     if (lit.empty())
         throw InputError(fmt::format("{} has no lit frame", session.folder().string()),
                          "capture or import photographs with a lamp on");
@@ -28,7 +28,7 @@ std::vector<FrameRecord> require_lit(const Session& session) {
 /// Balls that the calibration found in view beside the object.
 std::vector<cv::Vec3d> balls_in_view(const Session& session) {
     const ResultFiles files(session.folder());
-    if (!frames_of_kind(session, FrameKind::ball).empty() || !std::filesystem::exists(files.calibration)) return {};
+    if (!photographs_of(session, FrameKind::ball).empty() || !std::filesystem::exists(files.calibration)) return {};
     std::vector<cv::Vec3d> discs;
     for (const Ball& ball : read_calibration(files.calibration).calibration.balls)
         discs.emplace_back(ball.x, ball.y, ball.radius);
@@ -116,10 +116,12 @@ void SessionPhotos::keep_rows(const PhotoBand& band) {
         PhotoRows kept = band.photos[i];  // what makes radiance of them
         kept.samples = std::move(kept_[i].samples);
         kept.dark = std::move(kept_[i].dark);
+        kept.clipped = std::move(kept_[i].clipped);
         for (int row = 0; row < band.rows(); ++row) {
             if ((band.first_row + row) % keep_every_ != 0) continue;
             kept.samples.push_back(band.photos[i].samples.row(row));
             if (!band.photos[i].dark.empty()) kept.dark.push_back(band.photos[i].dark.row(row));
+            if (!band.photos[i].clipped.empty()) kept.clipped.push_back(band.photos[i].clipped.row(row));
         }
         kept_[i] = std::move(kept);
     }
@@ -147,7 +149,7 @@ cv::Mat1b SessionPhotos::kept_mask() const {
 
 BallFrames load_ball_frames(const Session& session, const WorkContext& work) {
     const std::vector<FrameRecord> lit = require_lit(session);
-    const std::vector<FrameRecord> own = frames_of_kind(session, FrameKind::ball);
+    const std::vector<FrameRecord> own = photographs_of(session, FrameKind::ball);
     if (!own.empty() && own.size() != lit.size())
         throw InputError(fmt::format("{} has {} frames of the ball for {} of the object", session.folder().string(),
                                      own.size(), lit.size()),

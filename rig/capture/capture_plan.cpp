@@ -2,6 +2,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "acquisition/frame/error.h"
@@ -29,26 +30,74 @@ std::set<std::string> checked(const std::vector<std::string>& wanted, const std:
     return names;
 }
 
-Shot shot(const CapturePlan& plan, const RigDescription& rig, std::optional<LampId> lamp) {
-    Shot shot;
-    shot.kind = lamp ? FrameKind::lit : FrameKind::dark;
-    shot.lamp = lamp;
-    shot.camera = {rig.camera.exposure, rig.camera.gain};
-    shot.name = fmt::format("{:04}_{}", plan.shots.size(), lamp ? rig.lamps.at(lamp->value).name : "dark");
-    return shot;
+void check_exposure(Seconds exposure, const RigDescription& rig, const std::vector<LampId>& lamps) {
+    for (const LampId id : lamps) {
+        const LampDescription& lamp = rig.lamps.at(id.value);
+        if (exposure + lamp.settle >= lamp.max_on)
+            throw InputError(fmt::format("an exposure of {} ms is longer than lamp '{}' may shine: max_on_s is {}",
+                                         exposure.count() * 1000, lamp.name, lamp.max_on.count()),
+                             "shorten the exposure or its brackets, or raise max_on_s of the lamp if it bears that");
+    }
+    if (!rig.flicker_hz) return;
+    constexpr double whole = 0.002;  // of a period
+    const double periods = exposure.count() * *rig.flicker_hz;
+    if (periods > 0.5 && std::abs(periods - std::round(periods)) <= whole) return;
+    throw InputError(
+        fmt::format("an exposure of {} ms is {:.3f} periods of the lamps' flicker", exposure.count() * 1000, periods),
+        fmt::format("make it a whole number of periods of {} ms, or let it be metered", 1000 / *rig.flicker_hz));
 }
+
+class PlanMaker {
+public:
+    explicit PlanMaker(const RigDescription& rig) : rig_(rig) {}
+
+    void add_part(Seconds exposure, const std::vector<LampId>& lamps) {
+        camera_ = {exposure, rig_.camera.gain};
+        const auto every = static_cast<std::size_t>(rig_.capture.dark_every);
+        const std::size_t frames = lamps.size() * static_cast<std::size_t>(rig_.capture.averages);
+        add(std::nullopt);
+        for (std::size_t lit = 0; lit < frames; ++lit) {
+            if (every > 0 && lit > 0 && lit % every == 0) add(std::nullopt);
+            add(lamps[lit % lamps.size()]);
+        }
+        add(std::nullopt);
+    }
+    CapturePlan take() { return std::move(plan_); }
+
+private:
+    void add(std::optional<LampId> lamp) {
+        const FrameKind off = rig_.capture.ambient ? FrameKind::ambient : FrameKind::dark;
+        Shot shot{lamp ? FrameKind::lit : off, lamp, camera_, ""};
+        const std::string label = lamp ? rig_.lamps.at(lamp->value).name : std::string(darkbox::name(off));
+        shot.name = fmt::format("{:04}_{}", plan_.shots.size(), label);
+        plan_.shots.push_back(std::move(shot));
+    }
+
+    const RigDescription& rig_;
+    CameraConfig camera_;
+    CapturePlan plan_;
+};
 
 }  // namespace
 
-CapturePlan plan_capture(const RigDescription& rig, const std::vector<std::string>& lamps) {
+std::vector<LampId> lamps_named(const RigDescription& rig, const std::vector<std::string>& names) {
     const std::vector<std::string> known = names_of(rig.lamps);
-    const std::set<std::string> wanted = checked(lamps.empty() ? known : lamps, known);
-    CapturePlan plan;
-    plan.shots.push_back(shot(plan, rig, std::nullopt));
+    const std::set<std::string> wanted = checked(names.empty() ? known : names, known);
+    std::vector<LampId> lamps;
     for (std::uint32_t id = 0; id < rig.lamps.size(); ++id)
-        if (wanted.count(rig.lamps[id].name) != 0) plan.shots.push_back(shot(plan, rig, LampId{id}));
-    plan.shots.push_back(shot(plan, rig, std::nullopt));
-    return plan;
+        if (wanted.contains(rig.lamps[id].name)) lamps.push_back(LampId{id});
+    return lamps;
+}
+
+CapturePlan plan_capture(const RigDescription& rig, const std::vector<std::string>& names) {
+    const std::vector<LampId> lamps = lamps_named(rig, names);
+    PlanMaker maker(rig);
+    for (const double factor : rig.capture.brackets) {
+        const Seconds exposure = factor * rig.camera.exposure;
+        check_exposure(exposure, rig, lamps);
+        maker.add_part(exposure, lamps);
+    }
+    return maker.take();
 }
 
 }  // namespace darkbox

@@ -13,6 +13,24 @@
 namespace darkbox {
 namespace {
 
+/// A room that fills more of the sensor than this leaves the lamps too little, and its noise drowns theirs.
+constexpr double most_ambient = 0.5;
+
+/// The shots of one exposure after the other.
+std::vector<std::span<const Shot>> parts_of(const CapturePlan& plan) {
+    const auto other = [](const Shot& a, const Shot& b) {
+        return a.camera.exposure != b.camera.exposure || a.camera.gain != b.camera.gain;
+    };
+    std::vector<std::span<const Shot>> parts;
+    for (auto begin = plan.shots.begin(); begin != plan.shots.end();) {
+        auto end = std::adjacent_find(begin, plan.shots.end(), other);
+        if (end != plan.shots.end()) ++end;
+        parts.emplace_back(begin, end);
+        begin = end;
+    }
+    return parts;
+}
+
 std::int64_t nanoseconds(TimePoint moment) { return moment.time_since_epoch().count(); }
 
 /// A closing dark frame that differed leaves the frames before it in doubt for good.
@@ -30,42 +48,52 @@ void validate(const CapturePlan& plan, const RigDescription& rig, const LampArra
             fmt::format("the rig describes {} lamps, but its driver has {}", rig.lamps.size(), lamps.size()),
             "correct [[lamps.lamp]] of rig.toml");
     if (plan.shots.empty()) throw InputError("the capture plan has no shots", "plan at least one lamp");
-    if (plan.shots.front().kind != FrameKind::dark)
-        throw InputError(fmt::format("the capture plan begins with {}", plan.shots.front().name),
-                         "begin with a dark frame: every other frame is compared with it");
     for (const Shot& shot : plan.shots) {
         const bool lit = shot.kind == FrameKind::lit;
-        if ((!lit && shot.kind != FrameKind::dark) || lit != shot.lamp.has_value())
+        const bool unlit = shot.kind == FrameKind::dark || shot.kind == FrameKind::ambient;
+        if ((!lit && !unlit) || lit != shot.lamp.has_value())
             throw InputError(fmt::format("shot {} is neither dark nor of one lamp", shot.name),
                              "plan lit shots with a lamp and dark shots without");
         if (lit && shot.lamp->value >= rig.lamps.size())
             throw InputError(fmt::format("shot {} wants lamp {}; allowed: 0 to {}", shot.name, shot.lamp->value,
                                          rig.lamps.size() - 1),
                              "plan lamps that the rig has");
-        if (shot.camera.exposure != plan.shots.front().camera.exposure ||
-            shot.camera.gain != plan.shots.front().camera.gain)
-            throw InputError(fmt::format("shot {} has an exposure or gain of its own", shot.name),
-                             "one dark frame serves one exposure and gain: plan a session for each");
     }
+    if (plan.shots.front().lamp)
+        throw InputError(fmt::format("the capture plan begins with {}", plan.shots.front().name),
+                         "begin with a dark frame: every other frame is compared with it");
+    for (const std::span<const Shot> part : parts_of(plan))
+        if (part.front().lamp)
+            throw InputError(
+                fmt::format("shot {} has an exposure or gain of its own, and no dark frame before it", part.front().name),
+                "begin every exposure with a dark frame: all others are compared with it");
 }
 
-/// One run of a plan; see run_capture(). The lamps go dark before the camera stops: a camera may hang while it does.
+CaptureDescription limits_of(const RigDescription& rig) {
+    CaptureDescription limits = rig.capture;
+    if (limits.ambient) limits.max_dark = most_ambient;
+    return limits;
+}
+
+/// The part of a plan that is of one exposure; see run_capture(). The lamps go dark before the camera stops: a camera may hang while it does.
 class Run {
 public:
-    Run(const CapturePlan& plan, const RigDescription& rig, const CaptureDevices& devices, FrameSink& sink,
-        const WorkContext& work, const TimingLookup& timings)
-        : plan_(plan),
+    Run(std::span<const Shot> shots, const CapturePlan& plan, const RigDescription& rig, const CaptureDevices& devices,
+        FrameSink& sink, const WorkContext& work, const TimingLookup& timings, CaptureSummary& summary)
+        : shots_(shots),
+          plan_(plan),
           rig_(rig),
           clock_(devices.clock),
           sink_(sink),
           work_(work),
-          source_(devices.camera, devices.clock, plan.shots.front().camera, work, timings),
+          source_(devices.camera, devices.clock, shots.front().camera, work, timings),
           lamps_(devices.lamps, devices.clock, rig),
-          check_(source_.info(), rig.capture),
-          settled_(rig, lamps_, source_, check_, devices.clock) {}
+          check_(source_.info(), limits_of(rig)),
+          settled_(rig, lamps_, source_, check_, devices.clock),
+          summary_(summary) {}
 
-    CaptureSummary all() {
-        for (auto shot = plan_.shots.begin(); shot != plan_.shots.end();) {
+    void all() {
+        for (auto shot = shots_.begin(); shot != shots_.end();) {
             const auto ahead = stretch_from(shot);
             if (ahead.size() > 1) {
                 take_ahead(ahead);
@@ -74,6 +102,7 @@ public:
             }
             if (is_kept(*shot)) {
                 ++summary_.resumed;
+                resumed_ = true;
             } else {
                 prepare(*shot);
                 take_settled(*shot);
@@ -81,8 +110,6 @@ public:
             ++shot;
         }
         lamps_.dark();
-        tell("");
-        return summary_;
     }
 
 private:
@@ -96,21 +123,23 @@ private:
     bool is_kept(const Shot& shot) const {
         const auto& records = sink_.kept();
         return std::any_of(records.begin(), records.end(), [&](const FrameRecord& record) {
-            return std::filesystem::path(record.file).stem() == shot.name && record.kind == shot.kind &&
-                   record.lamp == shot.lamp;
+            return record.file == file_of(shot) && record.kind == shot.kind && record.lamp == shot.lamp;
         });
     }
 
     /// The lit shots from here on that can be taken without a stop; none in settled mode.
-    std::span<const Shot> stretch_from(std::vector<Shot>::const_iterator shot) const {
+    std::span<const Shot> stretch_from(std::span<const Shot>::iterator shot) const {
         if (mode_ == SyncMode::settled) return {};
-        const auto end = std::find_if(shot, plan_.shots.end(), [&](const Shot& s) { return !s.lamp || is_kept(s); });
+        auto end = std::find_if(shot, shots_.end(), [&](const Shot& s) { return !s.lamp || is_kept(s); });
+        // One lamp twice in a row makes no switch to hear a witness of.
+        const auto twice = std::adjacent_find(shot, end, [](const Shot& a, const Shot& b) { return a.lamp == b.lamp; });
+        if (twice != end) end = twice + 1;
         return {shot, end};
     }
 
     void prepare(const Shot& shot) {
         tell(shot.lamp ? lamp(shot).name : "dark");
-        if (!check_.has_dark() && summary_.resumed > 0) compare_with_interrupted_run(shot.camera);
+        if (!check_.has_dark() && resumed_) compare_with_interrupted_run(shot.camera);
         wait_for_room();
     }
 
@@ -151,13 +180,13 @@ private:
     /// shows a lamp that got stuck or a door that was opened in the meantime.
     void compare_with_interrupted_run(const CameraConfig& config) {
         for (const FrameRecord& record : sink_.kept()) {
-            if (record.kind != FrameKind::dark) continue;
+            if (record.file != file_of(shots_.front())) continue;
             const Frame dark = sink_.read(record);
             check_same_camera(dark);
             check_.accept_dark(dark);
             break;
         }
-        take(Shot{FrameKind::dark, std::nullopt, config, "dark frame for comparison"});
+        take(Shot{shots_.front().kind, std::nullopt, config, "dark frame for comparison"});
     }
 
     void check_same_camera(const Frame& stored) const {
@@ -196,7 +225,7 @@ private:
     FrameRecord record_of(const Shot& shot, const TakenShot& taken) const {
         const Frame& frame = taken.frame;
         FrameRecord record;
-        record.file = "frames/" + shot.name + ".tif";
+        record.file = file_of(shot);
         record.kind = shot.kind;
         record.lamp = shot.lamp;
         record.exposure_s = frame.controls.exposure.count();
@@ -209,6 +238,7 @@ private:
             record.lamp_off_ns = nanoseconds(taken.off);
         }
         record.verification = taken.words;
+        if (const auto& noise = check_.noise()) record.noise = {noise->floor, noise->slope};
         return record;
     }
 
@@ -249,6 +279,7 @@ private:
         if (lost > 0) sink_.note_event(fmt::format("{}: the camera lost {} frames before this one", shot.name, lost));
     }
 
+    const std::span<const Shot> shots_;
     const CapturePlan& plan_;
     const RigDescription& rig_;
     Clock& clock_;
@@ -259,7 +290,8 @@ private:
     PictureCheck check_;
     SettledShots settled_;
     SyncMode mode_ = rig_.capture.mode;  ///< at present
-    CaptureSummary summary_;
+    bool resumed_ = false;               ///< some of these shots were kept by an earlier run
+    CaptureSummary& summary_;            ///< of the whole plan
 };
 
 }  // namespace
@@ -269,7 +301,11 @@ CaptureSummary run_capture(const CapturePlan& plan, const RigDescription& rig, c
     validate(plan, rig, devices.lamps);
     if (plan.closing_dark_differs_is_error) refuse_doubtful(sink);
     devices.lamps.dark();
-    return Run(plan, rig, devices, sink, work, timings).all();
+    CaptureSummary summary;
+    for (const std::span<const Shot> shots : parts_of(plan))
+        Run(shots, plan, rig, devices, sink, work, timings, summary).all();
+    work.tell({"capture", static_cast<std::size_t>(summary.taken + summary.resumed), plan.shots.size(), ""});
+    return summary;
 }
 
 }  // namespace darkbox

@@ -16,13 +16,20 @@
 
 namespace darkbox {
 
-/// A validated list of shots: dark, every lamp, dark again.
+/// A validated list of shots. Those of one exposure stand together, and begin and end without a lamp.
 struct CapturePlan {
     std::vector<Shot> shots;
     bool closing_dark_differs_is_error = true;
 };
 
-/// `lamps`: names to capture; empty = all. Throws InputError that names an unknown lamp and the known ones.
+/// The lamps of these names in the rig's order; empty = all. Throws InputError that names an unknown lamp and the known
+/// ones.
+std::vector<LampId> lamps_named(const RigDescription& rig, const std::vector<std::string>& names);
+
+/// For each of rig.capture.brackets: a frame without a lamp, every lamp as often as rig.capture.averages says, pass
+/// after pass so that what drifts drifts in all of them, a frame without a lamp between as rig.capture.dark_every says,
+/// and one at the end. `lamps`: names to capture; empty = all. Throws InputError that names an unknown lamp and the
+/// known ones, or an exposure that a lamp does not bear or that is no whole number of flicker periods.
 CapturePlan plan_capture(const RigDescription& rig, const std::vector<std::string>& lamps = {});
 
 struct CaptureSummary {

@@ -5,10 +5,13 @@
 
 #include <fstream>
 #include <iterator>
+#include <set>
 #include <span>
 #include <sstream>
 
 #include "acquisition/frame/error.h"
+#include "rig/capture/meter.h"
+#include "rig/capture/retake.h"
 #include "rig/capture/session_recorder.h"
 
 namespace darkbox {
@@ -19,20 +22,27 @@ namespace fs = std::filesystem;
 constexpr const char* rig_file = "rig.toml";
 /// The note that keeps the chosen lamps, so that a resume need not be told them again. Lamp names have no spaces.
 constexpr const char* lamps_note = "lamps: ";
+/// The same for an exposure that is not rig.toml's.
+constexpr const char* exposure_note = "exposure in us: ";
 
 std::vector<std::string> lamps_of(const CapturePlan& plan, const RigDescription& rig) {
     std::vector<std::string> names;
+    std::set<LampId> known;
     for (const Shot& shot : plan.shots)
-        if (shot.lamp) names.push_back(rig.lamps.at(shot.lamp->value).name);
+        if (shot.lamp && known.insert(*shot.lamp).second) names.push_back(rig.lamps.at(shot.lamp->value).name);
     return names;
+}
+
+std::optional<std::string> noted(const SessionInfo& info, const std::string& prefix) {
+    for (const std::string& note : info.notes)
+        if (note.starts_with(prefix)) return note.substr(prefix.size());
+    return std::nullopt;
 }
 
 /// The lamps that an interrupted session was begun with.
 std::vector<std::string> lamps_of(const SessionInfo& info) {
-    const std::string prefix = lamps_note;
-    for (const std::string& note : info.notes) {
-        if (note.compare(0, prefix.size(), prefix) != 0) continue;
-        std::istringstream words(note.substr(prefix.size()));
+    if (const auto note = noted(info, lamps_note)) {
+        std::istringstream words(*note);
         return {std::istream_iterator<std::string>(words), {}};
     }
     throw InputError("the session does not say which lamps it was begun with", "capture a new session");
@@ -54,33 +64,111 @@ void check_same_lamps(const CapturePlan& asked, const CapturePlan& begun, const 
             fmt::format("resume it without naming lamps; its lamps are: {}", fmt::join(lamps_of(begun, rig), ", ")));
 }
 
-/// A session, open for writing, and what it is to hold.
+/// A session, open for writing, what is to be captured for it, and the order of its frames in the end.
 struct Begun {
     SessionWriter writer;
     CapturePlan plan;
+    std::vector<std::string> order;
 };
+
+std::vector<std::string> files_of(const CapturePlan& plan) {
+    std::vector<std::string> files;
+    for (const Shot& shot : plan.shots) files.push_back(file_of(shot));
+    return files;
+}
 
 void keep_rig(SessionWriter& writer, const RigDescription& rig) {
     writer.add_extra(rig_file, std::as_bytes(std::span(rig.toml)));
 }
 
-Begun create(const CaptureRequest& request, const RigDescription& rig, Camera& camera) {
-    CapturePlan plan = plan_capture(rig, request.lamps);
-    const CameraInfo info = camera.configure(plan.shots.front().camera);
-    SessionWriter writer = SessionWriter::create(request.folder, session_info(rig, info, request.object, plan));
-    keep_rig(writer, rig);
-    return {std::move(writer), std::move(plan)};
+/// Sets rig.camera.exposure to what the request wants; says what was found where that was metered.
+std::optional<std::string> settle_exposure(const CaptureRequest& request, RigDescription& rig,
+                                           const CaptureDevices& devices, const WorkContext& work,
+                                           const TimingLookup& timings) {
+    const bool metered = request.exposure ? !request.exposure->fixed : rig.capture.metered;
+    if (!metered) {
+        if (request.exposure) rig.camera.exposure = *request.exposure->fixed;
+        return std::nullopt;
+    }
+    const Metering found = meter_exposure(rig, lamps_named(rig, request.lamps), devices, work, timings);
+    rig.camera.exposure = found.exposure;
+    return found.words();
 }
 
-Begun resume(const CaptureRequest& request, const RigDescription& rig) {
+Begun create(const CaptureRequest& request, RigDescription& rig, const CaptureDevices& devices, const WorkContext& work,
+             const TimingLookup& timings) {
+    const Seconds described = rig.camera.exposure;
+    const auto metered = settle_exposure(request, rig, devices, work, timings);
+    CapturePlan plan = plan_capture(rig, request.lamps);
+    SessionInfo info =
+        session_info(rig, devices.camera.configure(plan.shots.front().camera), request.object, plan);
+    if (rig.camera.exposure != described)
+        info.notes.push_back(fmt::format("{}{}", exposure_note, rig.camera.exposure.count() * 1e6));
+    SessionWriter writer = SessionWriter::create(request.folder, info);
+    keep_rig(writer, rig);
+    if (metered) writer.note_event(*metered);
+    std::vector<std::string> order = files_of(plan);
+    return {std::move(writer), std::move(plan), std::move(order)};
+}
+
+/// The frames that are not there yet: an earlier run may have been stopped on its way through them.
+void take_over(SessionWriter& writer, const Retake& retake) {
+    std::set<std::string> there;
+    for (const FrameRecord& record : writer.acknowledged()) there.insert(record.file);
+    for (std::size_t i = 0; i < retake.files.size(); ++i)
+        if (!there.contains(retake.taken_over[i].file)) writer.take_over(retake.files[i], retake.taken_over[i]);
+}
+
+Begun create_retake(const CaptureRequest& request, const RigDescription& rig, Camera& camera) {
+    if (request.exposure)
+        throw InputError("a re-take keeps its session's exposure", "leave out the exposure, or capture a new session");
+    const Session old = Session::open(*request.retake);
+    Retake retake = plan_retake(old, rig, request.lamps);
+    const CameraConfig& config = retake.plan.shots.front().camera;
+    const CameraInfo present = camera.configure(config);
+    require_same_camera(old, present, config);
+    SessionInfo info =
+        session_info(rig, present, request.object.empty() ? old.info().object : request.object, retake.plan);
+    info.planned_shots = static_cast<int>(retake.order.size());
+    info.retakes = retake.of;
+    SessionWriter writer = SessionWriter::create(request.folder, info);
+    keep_rig(writer, rig);
+    take_over(writer, retake);
+    writer.note_event(fmt::format("takes over {} frames of session {}, and takes {} again", retake.taken_over.size(),
+                                  retake.of.name, fmt::join(lamps_of(retake.plan, rig), ", ")));
+    return {std::move(writer), std::move(retake.plan), std::move(retake.order)};
+}
+
+/// What the interrupted session was to become.
+Retake plan_of(const SessionWriter& writer, const RigDescription& rig) {
+    const std::vector<std::string> lamps = lamps_of(writer.info());
+    if (const auto& reference = writer.info().retakes) {
+        const fs::path folder = fs::absolute(writer.folder()).parent_path() / reference->name;
+        const Session old = Session::open(folder);
+        if (old.reference() != *reference)
+            throw InputError(fmt::format("{} is not the session that the re-take was begun with", folder.string()),
+                             "bring that one back beside it");
+        return plan_retake(old, rig, lamps);
+    }
+    Retake whole;
+    whole.plan = plan_capture(rig, lamps);
+    whole.order = files_of(whole.plan);
+    return whole;
+}
+
+Begun resume(const CaptureRequest& request, RigDescription& rig) {
+    if (request.exposure || request.retake)
+        throw InputError("a resumed session keeps its exposure and its plan", "leave out --exposure and --retake");
     SessionWriter writer = SessionWriter::resume(request.folder);
     // A run killed before its first frame may have died before rig.toml was kept, too.
     if (writer.acknowledged().empty() && !fs::exists(writer.folder() / "data" / rig_file)) keep_rig(writer, rig);
     check_same_rig(writer, rig);
-    CapturePlan plan = plan_capture(rig, lamps_of(writer.info()));
-    if (!request.lamps.empty()) check_same_lamps(plan_capture(rig, request.lamps), plan, rig);
-    writer.note_event(fmt::format("resumed with {} of {} frames", writer.acknowledged().size(), plan.shots.size()));
-    return {std::move(writer), std::move(plan)};
+    if (const auto note = noted(writer.info(), exposure_note)) rig.camera.exposure = Seconds(std::stod(*note) / 1e6);
+    Retake begun = plan_of(writer, rig);
+    if (!request.lamps.empty()) check_same_lamps(plan_capture(rig, request.lamps), begun.plan, rig);
+    writer.note_event(fmt::format("resumed with {} of {} frames", writer.acknowledged().size(), begun.order.size()));
+    take_over(writer, begun);
+    return {std::move(writer), std::move(begun.plan), std::move(begun.order)};
 }
 
 }  // namespace
@@ -103,7 +191,7 @@ SessionInfo session_info(const RigDescription& rig, const CameraInfo& camera, co
     info.created = iso8601_now();
     info.source = "capture";
     info.rig = rig.name;
-    info.camera = camera.id.empty() ? camera.model : fmt::format("{} ({})", camera.model, camera.id);
+    info.camera = identity_of(camera);
     info.planned_shots = static_cast<int>(plan.shots.size());
     info.geometry = geometry_of(rig);
     info.notes.push_back(lamps_note + fmt::format("{}", fmt::join(lamps_of(plan, rig), " ")));
@@ -116,14 +204,17 @@ CapturedSession capture_session(const CaptureRequest& request, const RigDescript
     const DarkOnExit dark_on_exit(lamps);
     RigDescription rig = description;
     rig.capture.mode = request.mode.value_or(rig.capture.mode);
-    Begun begun = request.start == CaptureStart::create ? create(request, rig, camera) : resume(request, rig);
+    const CaptureDevices devices{lamps, camera, clock};
+    Begun begun = request.start == CaptureStart::resume ? resume(request, rig)
+                  : request.retake                      ? create_retake(request, rig, camera)
+                                                        : create(request, rig, devices, work, timings);
     CaptureSummary summary;
     {
         SessionRecorder recorder(begun.writer);
-        summary = run_capture(begun.plan, rig, {lamps, camera, clock}, recorder, work, timings);
+        summary = run_capture(begun.plan, rig, devices, recorder, work, timings);
         recorder.finish();
     }
-    return {begun.writer.seal(), summary};
+    return {begun.writer.seal(begun.order), summary};
 }
 
 }  // namespace darkbox

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,12 +14,20 @@ enum class CaptureStart {
     resume,  ///< goes on with an interrupted one
 };
 
+/// Which exposure a capture is to have.
+struct ExposureChoice {
+    std::optional<Seconds> fixed;  ///< none: metered; see meter.h
+};
+
 struct CaptureRequest {
     std::filesystem::path folder;    ///< of the session
     std::string object;              ///< name given by the user; a resumed session keeps its own
     std::vector<std::string> lamps;  ///< names; empty = all, or the interrupted session's own
     CaptureStart start = CaptureStart::create;
     std::optional<SyncMode> mode = {};  ///< none: the one of rig.toml
+    std::optional<ExposureChoice> exposure = {};  ///< none: as rig.toml says; a resumed session keeps its own
+    /// A sealed session of which `lamps` are taken again: the new one refers to it and takes the rest over.
+    std::optional<std::filesystem::path> retake = {};
 };
 
 struct CapturedSession {
@@ -33,9 +42,10 @@ CaptureGeometry geometry_of(const RigDescription& rig);
 SessionInfo session_info(const RigDescription& rig, const CameraInfo& camera, const std::string& object,
                          const CapturePlan& plan);
 
-/// The whole capture: starts or resumes the session, keeps rig.toml in it, takes every shot, seals. Lamps are dark when
+/// The whole capture: meters where that is asked for, starts or resumes the session, keeps rig.toml in it, takes every shot, seals. Lamps are dark when
 /// it returns or throws; whatever was acknowledged stays and can be resumed. Throws what run_capture() throws, and
-/// InputError when an interrupted session was begun with another rig.toml or other lamps.
+/// InputError when an interrupted session was begun with another rig.toml or other lamps, and what meter_exposure()
+/// and plan_retake() throw.
 CapturedSession capture_session(const CaptureRequest& request, const RigDescription& rig, LampArray& lamps,
                                 Camera& camera, Clock& clock, const WorkContext& work = {},
                                 const TimingLookup& timings = {});

@@ -26,6 +26,10 @@ constexpr const char* damaged_hint = "check the camera's cable and the load on i
 
 bool near(double a, double b) { return std::abs(a - b) <= control_tolerance * std::max(std::abs(a), std::abs(b)); }
 
+bool same_controls(const FrameControls& a, const FrameControls& b) {
+    return near(a.exposure.count(), b.exposure.count()) && near(a.gain, b.gain);
+}
+
 }  // namespace
 
 void stop_when_asked(const WorkContext& work) {
@@ -50,8 +54,7 @@ void check_frame(const Frame& frame, const CameraInfo& camera) {
         throw DamagedFrame(
             fmt::format("frame {} is truncated: {} of {} bytes", frame.sequence, frame.pixels.size(), wanted),
             damaged_hint);
-    if (!near(frame.controls.exposure.count(), camera.controls.exposure.count()) ||
-        !near(frame.controls.gain, camera.controls.gain))
+    if (!same_controls(frame.controls, camera.controls))
         throw DamagedFrame(fmt::format("frame {} was exposed for {} s at gain {}, not for {} s at gain {}",
                                        frame.sequence, frame.controls.exposure.count(), frame.controls.gain,
                                        camera.controls.exposure.count(), camera.controls.gain),
@@ -82,6 +85,7 @@ void FrameSource::recover(Nanoseconds patience) {
     camera_.stop();
     last_ = {};
     rhythm_.restart();
+    since_start_ = 0;
     passed_over_.reset();
     camera_.start();
     next(clock_.now() + patience);
@@ -138,7 +142,12 @@ FrameSource::Place FrameSource::take_in(Frame& frame) {
     told_end_ = measured_ ? rhythm_.exposure_of(frame).end : frame.exposure.end;
     frame.exposure = rhythm_.locked() && in_rhythm_ ? rhythm_.predicted(frame.sequence) : rhythm_.exposure_of(frame);
     note_picture(frame);
+    ++since_start_;
     return before;
+}
+
+bool FrameSource::has_old_controls(const Frame& frame) const {
+    return since_start_ <= info_.latency_frames && !same_controls(frame.controls, info_.controls);
 }
 
 /// Whether the frame holds next to no light: sensors without noise give one dark frame like another.
@@ -179,7 +188,7 @@ Frame FrameSource::first_after(TimePoint earliest, TimePoint deadline) {
         lost_ += lost_while_waiting(frame, before, begin);
         const Nanoseconds margin = rhythm_.locked() ? rhythm_.margin() : Nanoseconds(0);
         if (frame.exposure.begin >= earliest + margin) check_order(frame, before);
-        if (in_rhythm_ && frame.exposure.begin >= earliest + margin) {
+        if (in_rhythm_ && frame.exposure.begin >= earliest + margin && !has_old_controls(frame)) {
             check_present(frame);
             check_frame(frame, info_);
             if (passed_over_ && passed_over_->sequence + 1 != frame.sequence) passed_over_.reset();
@@ -221,7 +230,7 @@ std::optional<Frame> FrameSource::next_until(TimePoint moment) {
     lost_ += lost_while_waiting(*frame, before, begin);
     check_order(*frame, before);
     if (in_rhythm_) check_present(*frame);
-    check_frame(*frame, info_);
+    if (!has_old_controls(*frame)) check_frame(*frame, info_);
     return frame;
 }
 

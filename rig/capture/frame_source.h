@@ -77,6 +77,8 @@ private:
     Frame next(TimePoint deadline);
     /// Its place in the stream is noted, its exposure is the one measured.
     Place take_in(Frame& frame);
+    /// New controls take some exposures to come into effect: a frame of before, which is no fault.
+    bool has_old_controls(const Frame& frame) const;
     bool is_dark(const Frame& frame) const;
     void note_picture(const Frame& frame);
     /// A queue that was full when the wait began lost frames of before, which is no fault: they are not counted.
@@ -97,6 +99,7 @@ private:
     int repeats_ = 0;
     std::optional<Frame> passed_over_;
     bool failed_ = false;
+    int since_start_ = 0;  ///< frames taken in since the camera was started
     Place last_;  ///< of the last frame since the camera was started
     std::uint64_t lost_ = 0;
 };

@@ -39,6 +39,7 @@ public:
 
     /// Two exposures of one light have told what the noise comes to.
     bool knows_noise() const { return noise_.has_value(); }
+    const std::optional<NoiseModel>& noise() const { return noise_; }
 
     /// What the frame tells that the switch spoiled; see switch_witness.h. `before`: the lamp of before, none for
     /// darkness; `after`: the frame after the switch, null where it was to darkness. No value when the noise or the

@@ -13,10 +13,13 @@ namespace darkbox {
 /// One picture to take.
 struct Shot {
     FrameKind kind = FrameKind::lit;
-    std::optional<LampId> lamp;  ///< none: all dark
+    std::optional<LampId> lamp;  ///< of a lit shot; the others are dark or ambient
     CameraConfig camera;
     std::string name;  ///< of the file: "0003_lamp-04"
 };
+
+/// Its place in the session.
+inline std::string file_of(const Shot& shot) { return "frames/" + shot.name + ".tif"; }
 
 /// A proven picture of a shot.
 struct TakenShot {

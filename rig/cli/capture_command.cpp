@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <charconv>
 #include <chrono>
 #include <filesystem>
 #include <memory>
@@ -25,11 +26,25 @@ struct Arguments {
     std::string object;
     std::string plan = "all";
     std::string mode;  ///< empty: the rig's own
+    std::string exposure;  ///< "auto" or microseconds; empty: the rig's own
+    fs::path retake;
     fs::path resume;
     fs::path out;
     fs::path socket;
     bool standalone = false;
 };
+
+/// "auto", or microseconds; none for an empty text.
+std::optional<ExposureChoice> exposure_of(const std::string& text) {
+    if (text.empty()) return std::nullopt;
+    if (text == "auto") return ExposureChoice{};
+    double us = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), us);
+    if (error != std::errc() || end != text.data() + text.size() || !(us >= 1 && us <= 60e6))
+        throw InputError(fmt::format("--exposure {} is neither auto nor microseconds", text),
+                         "write auto, or 1 to 60000000");
+    return ExposureChoice{Seconds(us / 1e6)};
+}
 
 CommandResult captured(const std::string& folder, std::size_t frames, int repeated, int resumed, double seconds) {
     CommandResult result;
@@ -43,25 +58,30 @@ CommandResult captured(const std::string& folder, std::size_t frames, int repeat
 
 // In this process.
 
-/// A session is resumed with the rig it was begun with, unless another is named.
+/// A session is resumed, or taken again in parts, with the rig it was begun with, unless another is named.
 RigDescription rig_for(const Arguments& a, const CaptureRequest& request) {
     if (!a.rig.empty()) return load_rig(a.rig);
     if (a.simulate > 0) return parse_rig(simulated_rig_toml(a.simulate), "built-in simulated rig");
     const fs::path kept = request.folder / "data" / "rig.toml";
     if (request.start == CaptureStart::resume && fs::exists(kept)) return load_rig(kept);
+    if (request.retake && fs::exists(*request.retake / "data" / "rig.toml"))
+        return load_rig(*request.retake / "data" / "rig.toml");
     throw InputError("no rig is given", "give --rig rig.toml, or --simulate 12 for a simulated rig");
 }
 
 CaptureRequest request_for(const Arguments& a) {
     CaptureRequest request{
         .folder = a.out, .object = a.object, .lamps = lamps_of_plan(a.plan), .mode = sync_mode_from_name(a.mode)};
+    request.exposure = exposure_of(a.exposure);
     const fs::path folder = default_sessions_folder();
+    if (!a.retake.empty()) request.retake = fs::exists(a.retake) ? a.retake : folder / a.retake;
     if (!a.resume.empty()) {
         request.start = CaptureStart::resume;
         request.folder = fs::exists(a.resume) ? a.resume : folder / a.resume;
     } else if (a.out.empty()) {
         fs::create_directories(folder);
-        request.folder = folder / fresh_session_name(folder, a.object, std::chrono::system_clock::now());
+        const std::string label = a.object.empty() ? a.retake.filename().string() : a.object;
+        request.folder = folder / fresh_session_name(folder, label, std::chrono::system_clock::now());
     }
     return request;
 }
@@ -145,10 +165,12 @@ private:
 
 CaptureOrder order_for(const Arguments& a, const DaemonClient& client) {
     CaptureOrder order{.object = a.object, .lamps = lamps_of_plan(a.plan), .mode = sync_mode_from_name(a.mode)};
-    if (a.out.empty() && a.resume.empty()) return order;
+    order.exposure = exposure_of(a.exposure);
+    if (a.out.empty() && a.resume.empty() && a.retake.empty()) return order;
     const std::string folder = client.call("GET", "status").at("sessions");
     if (!a.resume.empty()) order.resume = name_in_folder(a.resume, folder);
     if (!a.out.empty()) order.name = name_in_folder(a.out, folder);
+    if (!a.retake.empty()) order.retake = name_in_folder(a.retake, folder);
     return order;
 }
 
@@ -201,7 +223,11 @@ CommandResult recalibrate(const DaemonClient& client, const WorkContext& work) {
 CommandResult run(const Arguments& a, const WorkContext& work) {
     if (!a.resume.empty() && !(a.out.empty() && a.object.empty()))
         throw InputError("a resumed session keeps its name and its object", "leave out --out and --object");
-    if (a.plan == "recalibrate" && (a.standalone || !a.resume.empty() || !a.out.empty()))
+    if (!a.resume.empty() && !(a.retake.empty() && a.exposure.empty()))
+        throw InputError("a resumed session keeps its plan and its exposure", "leave out --retake and --exposure");
+    if (!a.retake.empty() && !a.exposure.empty())
+        throw InputError("a re-take keeps its session's exposure", "leave out --exposure");
+    if (a.plan == "recalibrate" && (!a.retake.empty() || !a.exposure.empty() || a.standalone || !a.resume.empty() || !a.out.empty()))
         throw InputError("--plan recalibrate is darkboxd's to do, as a whole", "leave out the other options");
     if (a.standalone) return capture_here(a, work);
     const DaemonClient client(a.socket.empty() ? default_socket() : a.socket);
@@ -242,14 +268,20 @@ void add_capture_command(CommandLine& line) {
     const auto a = std::make_shared<Arguments>();
     CLI::App& command =
         line.add("capture", "Capture an object lamp by lamp, through darkboxd or in this process",
-                 "darkbox capture --object vase\n  darkbox capture --standalone --rig rig.toml --out vase",
+                 "darkbox capture --object vase\n  darkbox capture --standalone --rig rig.toml --out vase\n  "
+                 "darkbox capture --retake vase --lamps lamp-03 --out vase-2",
                  [a](const WorkContext& work) { return run(*a, work); });
     auto* rig = command.add_option("--rig", a->rig, "The rig's description, with --standalone");
     command.add_option("--simulate", a->simulate, "A simulated rig of this many lamps, with --standalone")
         ->check(CLI::Range(3, 64))
         ->excludes(rig);
     command.add_option("--object", a->object, "Name of the object");
-    command.add_option("--plan", a->plan, "all, names of lamps between commas, or recalibrate");
+    command.add_option("--plan,--lamps", a->plan, "all, names of lamps between commas, or recalibrate");
+    command.add_option("--exposure", a->exposure,
+                       "auto: metered, so that the object reaches 80 to 90 % of full scale; or microseconds; default: the "
+                       "rig's");
+    command.add_option("--retake", a->retake,
+                       "Take --lamps of this sealed session again, into a new one that takes the rest over");
     command
         .add_option("--mode", a->mode, "How fast: settled, predictive or strobed; default: the rig's [capture] mode")
         ->check(CLI::IsMember({"settled", "predictive", "strobed"}));

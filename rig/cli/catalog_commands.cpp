@@ -54,7 +54,8 @@ fs::path folder_of(const Arguments& a) { return a.folder.empty() ? default_sessi
 
 Json describe(const SessionListing& session) {
     return {{"name", session.name},       {"state", name(session.state)}, {"object", session.object},
-            {"created", session.created}, {"frames", session.frames},     {"problem", session.problem}};
+            {"created", session.created}, {"frames", session.frames},     {"problem", session.problem},
+            {"retakes", session.retakes}};
 }
 
 Json sessions_on_disk(const fs::path& folder) {
@@ -87,8 +88,10 @@ CommandResult sessions(const Arguments& a) {
     result.json = client ? ask_for_all(*client, "sessions") : sessions_on_disk(folder_of(a));
     for (const Json& session : result.json.at("sessions")) {
         result.text +=
-            fmt::format("{:<40} {:<12} {:>4} frames  {:<22} {}\n", text(session, "name"), text(session, "state"),
+            fmt::format("{:<40} {:<12} {:>4} frames  {:<22} {}", text(session, "name"), text(session, "state"),
                         session.at("frames").get<int>(), text(session, "created"), text(session, "object"));
+        const std::string retakes = text(session, "retakes");
+        result.text += retakes.empty() ? "\n" : fmt::format(", retakes {}\n", retakes);
         if (const std::string problem = text(session, "problem"); !problem.empty())
             result.warnings.push_back(fmt::format("{}: {}", text(session, "name"), problem));
     }

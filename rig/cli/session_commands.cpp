@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "acquisition/frame/error.h"
+#include "acquisition/session/bag.h"
 #include "processing/pipeline/export.h"
 #include "rig/cli/arguments.h"
 #include "rig/cli/commands.h"
@@ -11,6 +12,24 @@ namespace darkbox {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// What became of the session that another one refers to; it is looked for in the same folder.
+struct Referred {
+    std::size_t frames = 0;  ///< taken over, from it or from those before it
+    bool found = false;
+    bool unchanged = false;
+};
+
+Referred look_up(const Session& session, const SessionReference& old) {
+    Referred referred;
+    for (const FrameRecord& frame : session.frames()) referred.frames += !frame.taken_over_from.empty();
+    const fs::path plain = session.folder().has_filename() ? session.folder() : session.folder().parent_path();
+    const fs::path there = fs::absolute(plain).parent_path() / old.name;
+    if (!is_sealed(there)) return referred;
+    referred.found = true;
+    referred.unchanged = Session::open(there).reference() == old;
+    return referred;
+}
 
 CommandResult verify(const fs::path& folder) {
     const Session session = Session::open(folder);
@@ -23,6 +42,16 @@ CommandResult verify(const fs::path& folder) {
         result.warnings.push_back(fmt::format("{} frames were not verified to be lit by their lamp", unverified));
     result.json = {{"session", folder.string()}, {"frames", session.frames().size()}, {"complete", true}};
     result.text = fmt::format("{}: {} frames, every checksum fits", folder.string(), session.frames().size());
+    if (const auto& old = session.info().retakes) {
+        const Referred referred = look_up(session, *old);
+        result.json["retakes"] = {{"session", old->name}, {"found", referred.found}, {"unchanged", referred.unchanged}};
+        result.text += fmt::format("; {} of them taken over from {}, which {}", referred.frames, old->name,
+                                   !referred.found        ? "is not beside it"
+                                   : !referred.unchanged ? "is beside it, but holds something else by now"
+                                                         : "is beside it as it was");
+        if (referred.found && !referred.unchanged)
+            result.warnings.push_back(fmt::format("{} is not the session that {} refers to", old->name, folder.string()));
+    }
     return result;
 }
 

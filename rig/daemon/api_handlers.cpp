@@ -122,6 +122,7 @@ Json Api::describe(const SessionListing& session, const ServiceStatus& status) c
     if (!session.object.empty()) json["object"] = session.object;
     if (!session.created.empty()) json["created"] = session.created;
     if (!session.problem.empty()) json["problem"] = session.problem;
+    if (!session.retakes.empty()) json["retakes"] = session.retakes;
     return json;
 }
 

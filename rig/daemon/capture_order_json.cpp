@@ -27,6 +27,16 @@ std::string text(const Json& value, const std::string& key) {
     return text;
 }
 
+ExposureChoice exposure(const Json& value) {
+    constexpr double shortest_us = 1, longest_us = 60e6;
+    if (value.is_number() && value.get<double>() >= shortest_us && value.get<double>() <= longest_us)
+        return {Seconds(value.get<double>() / 1e6)};
+    if (value == "auto") return {std::nullopt};
+    throw InputError(fmt::format("\"exposure\" is {}", value.dump(-1, ' ', true, Json::error_handler_t::replace)
+                                                            .substr(0, longest_text)),
+                     R"(write "auto", or microseconds: 1 to 60000000)");
+}
+
 std::vector<std::string> texts(const Json& value, const std::string& key) {
     if (!value.is_array() || value.size() > most_lamps)
         throw InputError(fmt::format("\"{}\" is not a list of up to {} names", key, most_lamps),
@@ -54,6 +64,10 @@ CaptureOrder capture_order_from(const Json& json) {
             order.name = text(value, key);
         } else if (key == "resume") {
             order.resume = text(value, key);
+        } else if (key == "retake") {
+            order.retake = text(value, key);
+        } else if (key == "exposure") {
+            order.exposure = exposure(value);
         } else if (key == "lamps") {
             order.lamps = texts(value, key);
         } else if (key == "mode") {
@@ -63,7 +77,7 @@ CaptureOrder capture_order_from(const Json& json) {
                                  "known: settled, predictive, strobed");
         } else if (key != "process") {  // what is to follow is the queue's concern
             throw InputError(fmt::format("unknown key \"{}\"", key.substr(0, longest_text)),
-                             "known: object, lamps, mode, name, resume");
+                             "known: object, lamps, mode, exposure, name, retake, resume");
         }
     }
     return order;
@@ -115,6 +129,11 @@ Json to_json(const CaptureOrder& order) {
     if (!order.name.empty()) json["name"] = order.name;
     if (!order.lamps.empty()) json["lamps"] = order.lamps;
     if (order.mode) json["mode"] = name(*order.mode);
+    if (order.exposure) {
+        const auto& fixed = order.exposure->fixed;
+        json["exposure"] = fixed ? Json(fixed->count() * 1e6) : Json("auto");
+    }
+    if (order.retake) json["retake"] = *order.retake;
     if (order.resume) json["resume"] = *order.resume;
     return json;
 }

@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using SQLite::Statement;
 
-constexpr const char* session_columns = "name, state, object, created, frames, problem";
+constexpr const char* session_columns = "name, state, object, created, frames, problem, retakes";
 
 SessionListing read_listing(Statement& row) {
     return {.name = row.getColumn(0).getString(),
@@ -26,7 +26,8 @@ SessionListing read_listing(Statement& row) {
             .object = row.getColumn(2).getString(),
             .created = row.getColumn(3).getString(),
             .frames = static_cast<std::size_t>(row.getColumn(4).getInt64()),
-            .problem = row.getColumn(5).getString()};
+            .problem = row.getColumn(5).getString(),
+            .retakes = row.getColumn(6).getString()};
 }
 
 CatalogFrame read_frame_row(Statement& row) {
@@ -109,8 +110,8 @@ void put_calibration(SQLite::Database& database, const CatalogCalibration& c) {
 
 void insert_session(SQLite::Database& database, const ScannedSession& scanned, const std::string& stamp) {
     const SessionListing& s = scanned.listing;
-    Statement insert(database, "INSERT INTO sessions VALUES (?, ?, ?, ?, ?, ?, ?)");
-    bind_all(insert, s.name, name(s.state), s.object, s.created, whole(s.frames), s.problem, stamp);
+    Statement insert(database, "INSERT INTO sessions VALUES (?, ?, ?, ?, ?, ?, ?, ?)");
+    bind_all(insert, s.name, name(s.state), s.object, s.created, whole(s.frames), s.problem, stamp, s.retakes);
     insert.exec();
     insert_frames(database, scanned);
     if (scanned.calibration) put_calibration(database, *scanned.calibration);

@@ -44,6 +44,10 @@ CREATE TABLE drift (
     role TEXT NOT NULL, steady INTEGER NOT NULL, alarm TEXT NOT NULL, findings TEXT NOT NULL,
     PRIMARY KEY (session, role)
 ) WITHOUT ROWID;
+)sql",
+    R"sql(
+DELETE FROM sessions;
+ALTER TABLE sessions ADD COLUMN retakes TEXT NOT NULL DEFAULT '';
 )sql"};
 static_assert(migrations.size() == catalog_version);
 

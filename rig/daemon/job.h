@@ -17,6 +17,8 @@ struct CaptureOrder {
     std::string object = {};
     std::vector<std::string> lamps = {};     ///< names; empty = all
     std::optional<SyncMode> mode = {};       ///< none: the one of rig.toml
+    std::optional<ExposureChoice> exposure = {};  ///< none: as rig.toml says
+    std::optional<std::string> retake = {};  ///< name of a sealed session whose `lamps` are to be taken again
     std::string name = {};                   ///< of the session; empty = made from object and date
     std::optional<std::string> resume = {};  ///< name of an interrupted session
 };

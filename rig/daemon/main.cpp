@@ -66,7 +66,10 @@ std::uint64_t capture_bytes(const RigDescription& rig, const CaptureOrder& order
     const std::uint64_t pixels = width * height > 0 ? width * height : large;
     const std::uint64_t planes = rig.camera.format.starts_with("RGB") || rig.camera.format.starts_with("BGR") ? 3 : 1;
     const std::size_t lamps = order.lamps.empty() ? rig.lamps.size() : order.lamps.size();
-    return (lamps + 2) * pixels * planes * 2 + papers;
+    const auto brackets = static_cast<std::uint64_t>(rig.capture.brackets.size());
+    const auto lit = lamps * static_cast<std::uint64_t>(rig.capture.averages);
+    const std::uint64_t between = rig.capture.dark_every > 0 ? lit / static_cast<std::uint64_t>(rig.capture.dark_every) : 0;
+    return brackets * (lit + between + 2) * pixels * planes * 2 + papers;
 }
 
 /// "127.0.0.1:7640" or "[::1]:7640"

@@ -91,17 +91,27 @@ ServiceStatus Service::status() const {
 
 CaptureRequest Service::request_for(const CaptureOrder& order, int attempt) const {
     const bool resumes = order.resume.has_value();
-    if (resumes && !(order.name.empty() && order.object.empty()))
-        throw InputError("a resumed session keeps its name and object", "give either \"resume\" or the others");
+    if (resumes && (!order.name.empty() || !order.object.empty() || order.retake || order.exposure))
+        throw InputError("a resumed session keeps its name, object and plan", "give either \"resume\" or the others");
+    if (order.retake && order.exposure)
+        throw InputError("a re-take keeps its session's exposure", "leave out \"exposure\"");
     const std::string session =
         resumes              ? *order.resume
-        : order.name.empty() ? fresh_session_name(options_.sessions, order.object, std::chrono::system_clock::now())
+        : order.name.empty() ? fresh_session_name(options_.sessions, order.object.empty() ? order.retake.value_or("") : order.object,
+                                                  std::chrono::system_clock::now())
                              : order.name;
     CaptureRequest request{.folder = session_path(options_.sessions, session),
                            .object = order.object,
                            .lamps = order.lamps,
                            .start = resumes ? CaptureStart::resume : CaptureStart::create,
                            .mode = order.mode};
+    request.exposure = order.exposure;
+    if (order.retake) {
+        request.retake = session_path(options_.sessions, *order.retake);
+        if (!is_sealed(*request.retake))
+            throw NotFound(fmt::format("there is no sealed session \"{}\"", *order.retake),
+                           "darkbox sessions lists them");
+    }
     const bool there = std::filesystem::exists(request.folder);
     if (resumes && !there)
         throw NotFound(fmt::format("there is no session \"{}\"", session), "darkbox sessions lists them");

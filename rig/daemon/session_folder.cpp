@@ -54,6 +54,7 @@ SessionListing describe_sealed(const fs::path& folder) {
         listing.object = session.info().object;
         listing.created = session.info().created;
         listing.frames = session.frames().size();
+        if (session.info().retakes) listing.retakes = session.info().retakes->name;
     } catch (const Error& error) {
         // One damaged session must not hide the others.
         listing.state = State::damaged;
@@ -68,6 +69,7 @@ SessionListing describe_interrupted(const fs::path& folder) {
         const SessionInfo info = Journal::read_head(folder);
         listing.object = info.object;
         listing.created = info.created;
+        if (info.retakes) listing.retakes = info.retakes->name;
         listing.frames = files_in(folder / "data" / "frames");
     } catch (const Error& error) {
         listing.state = State::damaged;

@@ -21,6 +21,7 @@ struct SessionListing {
     std::string created = {};  ///< ISO 8601, UTC
     std::size_t frames = 0;
     std::string problem = {};  ///< of a damaged one, in words
+    std::string retakes = {};  ///< the session of which this one takes lamps again; empty: none
 };
 
 std::string name(SessionListing::State state);

@@ -8,6 +8,7 @@
 #include <iterator>
 
 #include "acquisition/frame/error.h"
+#include "rig/description/capture_section.h"
 #include "rig/description/toml_section.h"
 
 namespace darkbox {
@@ -191,10 +192,11 @@ UsbDescription read_usb(TomlSection& section) {
 }
 
 void read_lamps(TomlSection& section, RigDescription& rig) {
-    section.allow({"driver", "distant", "gpio", "usb", "lamp"});
+    section.allow({"driver", "distant", "flicker_hz", "gpio", "usb", "lamp"});
     rig.lamps_driver = section.choice("driver", rig.lamps_driver, {"gpio", "usb", "sim"});
     const bool simulated_distant = rig.lamps_driver == "sim" && !has_word(rig.sim.scene, "near");
     rig.distant_lamps = section.flag("distant").value_or(simulated_distant);
+    rig.flicker_hz = section.number("flicker_hz", {1, 1'000'000});
     bool active_low = false;
     auto gpio = section.section("gpio", "[lamps.gpio]");
     if (gpio && rig.lamps_driver != "gpio")
@@ -306,23 +308,10 @@ CameraDescription read_camera(TomlSection& section) {
     return camera;
 }
 
-CaptureDescription read_capture(TomlSection& section) {
-    CaptureDescription capture;
-    section.allow({"mode", "frame_deadline_s", "tries", "min_signal", "max_dark"});
-    capture.mode = *sync_mode_from_name(
-        section.choice("mode", std::string(name(capture.mode)), {"settled", "predictive", "strobed"}));
-    capture.frame_deadline =
-        Seconds(section.number("frame_deadline_s", {0.01, 600}).value_or(capture.frame_deadline.count()));
-    capture.tries = static_cast<int>(section.integer("tries", {1, 100}).value_or(capture.tries));
-    capture.min_signal = section.number("min_signal", {0.0001, 0.5}).value_or(capture.min_signal);
-    capture.max_dark = section.number("max_dark", {0, 0.5}).value_or(capture.max_dark);
-    return capture;
-}
-
 SimDescription read_sim(TomlSection& section) {
     SimDescription sim;
     section.allow({"scene", "width", "height", "bit_depth", "full_well_e", "read_noise_e", "latency_frames",
-                   "queue_depth", "seed", "real_time", "lamps_seen", "strobe_line"});
+                   "queue_depth", "seed", "room_light", "real_time", "lamps_seen", "strobe_line"});
     const auto whole = [&](const char* key, Allowed<std::int64_t> allowed, int fallback) {
         return static_cast<int>(section.integer(key, allowed).value_or(fallback));
     };
@@ -334,6 +323,7 @@ SimDescription read_sim(TomlSection& section) {
     sim.read_noise_e = section.number("read_noise_e", {0, 1000}).value_or(sim.read_noise_e);
     sim.latency_frames = whole("latency_frames", {0, 16}, sim.latency_frames);
     sim.queue_depth = whole("queue_depth", {1, 32}, sim.queue_depth);
+    sim.room_light = section.number("room_light", {0, 1}).value_or(sim.room_light);
     const auto any_seed = Allowed<std::int64_t>{0, std::numeric_limits<std::int64_t>::max()};
     sim.seed =
         static_cast<std::uint64_t>(section.integer("seed", any_seed).value_or(static_cast<std::int64_t>(sim.seed)));
@@ -405,24 +395,6 @@ void refuse_huge(std::uintmax_t size, const std::string& origin) {
 }
 
 }  // namespace
-
-std::string_view name(SyncMode mode) {
-    switch (mode) {
-        case SyncMode::settled:
-            return "settled";
-        case SyncMode::predictive:
-            return "predictive";
-        case SyncMode::strobed:
-            break;
-    }
-    return "strobed";
-}
-
-std::optional<SyncMode> sync_mode_from_name(std::string_view text) {
-    for (const SyncMode mode : {SyncMode::settled, SyncMode::predictive, SyncMode::strobed})
-        if (name(mode) == text) return mode;
-    return std::nullopt;
-}
 
 RigDescription parse_rig(const std::string& toml, const std::string& origin) {
     refuse_huge(toml.size(), origin);

@@ -70,6 +70,11 @@ std::optional<SyncMode> sync_mode_from_name(std::string_view name);
 
 struct CaptureDescription {
     SyncMode mode = SyncMode::settled;
+    bool metered = false;               ///< exposure = "metered": found before each capture; else exposure_ms of [camera]
+    bool ambient = false;               ///< the room's light is not kept out: frames without a lamp are of kind ambient
+    int dark_every = 0;                 ///< lit frames after which one without a lamp comes; 0: at both ends only
+    int averages = 1;                   ///< frames of every lamp at every exposure
+    std::vector<double> brackets{1.0};  ///< exposures of every lamp, as multiples of the one exposure
     Seconds frame_deadline{5.0};  ///< the longest wait for one frame
     int tries = 3;                ///< per shot, before the session fails
     double min_signal = 0.002;    ///< a lit frame's mean must exceed the dark frame's by this share of full scale
@@ -88,6 +93,7 @@ struct SimDescription {
     int latency_frames = 1;
     int queue_depth = 2;
     std::uint64_t seed = 1;
+    double room_light = 0;                ///< what the room adds: this share of every lamp's light, always
     bool real_time = false;               ///< virtual time otherwise
     std::filesystem::path lamps_seen{};   ///< the camera sees the lamps that this file tells of, not simulated ones
     std::filesystem::path strobe_line{};  ///< with lamps_seen: where the camera's strobe line is told
@@ -102,6 +108,7 @@ struct RigDescription {
     UsbDescription usb;
     std::vector<LampDescription> lamps;
     bool distant_lamps = false;  ///< their light is parallel: behind collimators, or simulated so
+    std::optional<double> flicker_hz;  ///< of the lamps' light (PWM, mains): exposures are whole numbers of its periods
     std::optional<double> ball_diameter_mm;
     CaptureDescription capture;
     SimDescription sim;

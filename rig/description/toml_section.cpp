@@ -187,6 +187,15 @@ std::optional<std::vector<double>> TomlSection::numbers(const std::string& key, 
     return values;
 }
 
+std::vector<double> TomlSection::numbers_up_to(const std::string& key, std::size_t most) {
+    const toml::node* node = find(key);
+    const toml::array* array = node == nullptr ? nullptr : node->as_array();
+    const std::size_t count = array == nullptr ? 0 : array->size();
+    if (node != nullptr && (count < 1 || count > most))
+        wrong_type(key, *node, fmt::format("1 to {} numbers in brackets", most));
+    return numbers(key, count).value_or(std::vector<double>());
+}
+
 std::optional<TomlSection> TomlSection::section(const std::string& key, const std::string& title) {
     const toml::node* node = find(key);
     if (node == nullptr) return std::nullopt;

@@ -42,6 +42,8 @@ public:
     std::optional<bool> flag(const std::string& key);
     /// Exactly `count` finite numbers.
     std::optional<std::vector<double>> numbers(const std::string& key, std::size_t count);
+    /// One to `most` finite numbers.
+    std::vector<double> numbers_up_to(const std::string& key, std::size_t most);
     /// No value where the table is absent.
     std::optional<TomlSection> section(const std::string& key, const std::string& title);
     /// The tables of [[key]], in order; `title` names each in messages. Empty where there are none.

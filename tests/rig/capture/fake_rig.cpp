@@ -91,16 +91,16 @@ CameraInfo FakeCamera::configure(const CameraConfig& config) {
     if (state_ == State::streaming) throw std::logic_error("configure() of a streaming camera");
     state_ = State::ready;
     info_.model = "fake";
-    info_.id = "0001";
+    info_.id = id;
     info_.width = width;
     info_.height = height;
     info_.format = PixelFormat::grey16;
     info_.bit_depth = 12;
-    info_.black_level = black;
+    info_.black_level = black_level;
     info_.frame_period = Seconds(period);
     info_.queue_depth = queue_depth;
     info_.readout = Seconds(0);
-    info_.controls = {config.exposure, config.gain};
+    info_.controls = {config.exposure, config.gain * gain_in_effect};
     return info_;
 }
 

@@ -78,6 +78,9 @@ public:
     std::set<std::uint64_t> lost;  ///< sequence numbers that never arrive
     bool hanging = false;          ///< delivers nothing; stop() ends it unless it hangs for ever
     bool hangs_for_ever = false;
+    std::string id = "0001";
+    double black_level = 64;
+    double gain_in_effect = 1;
     double contrast = 800;  ///< how much more a lamp lights its band than the rest, in samples
     int starts = 0;
     int delivered = 0;

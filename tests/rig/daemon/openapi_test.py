@@ -57,6 +57,10 @@ def end_of(api, job):
     raise AssertionError("the events ended before the job")
 
 
+def session_exposure(api, name):
+    return api.call("getSession", name=name).json()["frame_list"][0]["exposure_s"]
+
+
 def drive_a_capture(api):
     status = api.call("getStatus").json()
     while status["state"] == "Offline":
@@ -74,6 +78,16 @@ def drive_a_capture(api):
     done = end_of(api, job)
     assert done["event"] == "done" and done["frames"] == len(lamps) + 2, done
     assert previews > 0, "no preview during the whole capture"
+
+    job = api.call("startCapture", {"retake": "vase", "lamps": lamps[:1], "name": "vase-again"}).json()
+    done = end_of(api, job)
+    assert done["event"] == "done" and done["frames"] == len(lamps) + 4, done
+    assert api.call("getSession", name="vase-again").json()["retakes"] == "vase"
+    assert api.call("startCapture", {"retake": "none", "lamps": lamps[:1]}).status == 404
+    assert api.call("startCapture", {"exposure": "dim"}).status == 400
+    job = api.call("startCapture", {"exposure": "auto", "lamps": lamps[:3], "name": "metered"}).json()
+    assert end_of(api, job)["event"] == "done"
+    assert api.call("getSession", name="metered").json()["frame_list"][0]["exposure_s"] != session_exposure(api, "vase")
 
     log = api.call("getJobLog", id=job["id"])
     assert b"done" in log.body

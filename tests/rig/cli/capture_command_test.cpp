@@ -1,0 +1,85 @@
+// `darkbox capture` as a person or a script runs it, in a process of its own, on the simulated rig.
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "acquisition/session/session.h"
+#include "tests/rig/cli/captured_frames.h"
+#include "tests/rig/cli/program.h"
+#include "tests/support/test_data.h"
+
+namespace darkbox {
+namespace {
+
+namespace fs = std::filesystem;
+using test::darkbox_program;
+using testing::HasSubstr;
+
+class CaptureCommand : public testing::Test {
+protected:
+    CaptureCommand() { std::ofstream(rig_) << test::small_rig(6); }
+
+    test::ProgramResult capture(const std::vector<std::string>& more) const {
+        std::vector<std::string> arguments{"capture", "--standalone", "--json"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return darkbox_program(arguments);
+    }
+
+    test::TemporaryFolder folder_;
+    const fs::path rig_ = folder_.path() / "rig.toml";
+    const fs::path vase_ = folder_.path() / "vase";
+    const fs::path again_ = folder_.path() / "vase-2";
+};
+
+TEST_F(CaptureCommand, TakesALampAgainIntoASessionThatProcesses) {
+    ASSERT_EQ(capture({"--rig", rig_, "--out", vase_}).status, 0);
+    const auto retaken = capture({"--retake", vase_, "--lamps", "lamp-03", "--out", again_});
+    ASSERT_EQ(retaken.status, 0) << retaken.err;
+    EXPECT_EQ(nlohmann::json::parse(retaken.out).at("frames"), 10);
+    const auto verified = darkbox_program({"verify", again_, "--json"});
+    EXPECT_EQ(verified.status, 0) << verified.err;
+    const auto retakes = nlohmann::json::parse(verified.out).at("retakes");
+    EXPECT_EQ(retakes, nlohmann::json({{"session", "vase"}, {"found", true}, {"unchanged", true}}));
+    const auto listed = darkbox_program({"sessions", "--folder", folder_.path()});
+    EXPECT_THAT(listed.out, HasSubstr("retakes vase"));
+    const auto processed = darkbox_program({"process", again_});
+    EXPECT_EQ(processed.status, 0) << processed.err;
+    const auto evaluated = darkbox_program({"evaluate", again_, "--json"});
+    EXPECT_EQ(evaluated.status, 0) << evaluated.err;
+}
+
+TEST_F(CaptureCommand, MetersAndSaysSo) {
+    const auto metered = capture({"--rig", rig_, "--out", vase_, "--exposure", "auto"});
+    ASSERT_EQ(metered.status, 0) << metered.err;
+    const Session session = Session::open(vase_);
+    ASSERT_FALSE(session.events().empty());
+    EXPECT_THAT(session.events().front().what, HasSubstr("metered: exposure"));
+    ASSERT_EQ(capture({"--rig", rig_, "--out", again_, "--exposure", "7500"}).status, 0);
+    EXPECT_DOUBLE_EQ(Session::open(again_).frames().front().exposure_s, 0.0075);
+}
+
+TEST_F(CaptureCommand, RefusesWhatMakesNoSense) {
+    EXPECT_THAT(capture({"--rig", rig_, "--exposure", "bright"}).err, HasSubstr("neither auto nor microseconds"));
+    EXPECT_THAT(capture({"--rig", rig_, "--retake", vase_, "--exposure", "auto"}).err,
+                HasSubstr("keeps its session's"));
+    EXPECT_NE(
+        capture({"--rig", rig_, "--retake", folder_.path() / "none", "--lamps", "lamp-03", "--out", again_}).status, 0);
+    EXPECT_FALSE(fs::exists(again_));
+}
+
+TEST_F(CaptureCommand, BracketsAndAveragesProcessAsOnePhotographALamp) {
+    std::ofstream(rig_, std::ios::app) << "\n[capture]\naverages = 2\nbrackets = [1, 0.25]\ndark_every = 4\n";
+    const auto captured = capture({"--rig", rig_, "--out", vase_});
+    ASSERT_EQ(captured.status, 0) << captured.err;
+    EXPECT_EQ(nlohmann::json::parse(captured.out).at("frames"), 2 * (12 + 2 + 2));
+    const auto processed = darkbox_program({"process", vase_});
+    ASSERT_EQ(processed.status, 0) << processed.err;
+    std::ifstream lights(vase_ / "calibration/lights.lp");
+    int count = 0;
+    lights >> count;
+    EXPECT_EQ(count, 6);
+}
+
+}  // namespace
+}  // namespace darkbox
