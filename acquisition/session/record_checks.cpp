@@ -137,6 +137,7 @@ void require_valid(const std::string& where, const SessionInfo& info) {
     require_between(where, "schema_version", info.schema_version, session_schema, session_schema);
     require_between(where, "planned_shots", info.planned_shots, 0, most_shots);
     if (info.geometry) require_valid(where, *info.geometry);
+    require_valid(where, info.record);
 }
 
 void require_valid(const std::string& where, const FrameRecord& record) {

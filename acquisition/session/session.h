@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "acquisition/frame/ids.h"
+#include "acquisition/session/object_record.h"
 
 namespace darkbox {
 
@@ -89,6 +90,7 @@ struct SessionInfo {
     int planned_shots = 0;           ///< frames the session needs to be complete
     std::vector<std::string> notes;  ///< choices made on the way in, such as the transfer curve, in words
     std::optional<CaptureGeometry> geometry = {};
+    ObjectRecord record = {};  ///< of the object
 };
 
 /// A sealed session, read only. Thread-compatible; const members are thread-safe.

@@ -64,6 +64,15 @@ public:
         return value.get<std::string>();
     }
 
+    std::vector<std::string> texts(const char* key) const {
+        std::vector<std::string> texts;
+        for (const Json& element : array(key)) {
+            if (!element.is_string()) wrong_type(key, "a list of texts");
+            texts.push_back(element.get<std::string>());
+        }
+        return texts;
+    }
+
     double number(const char* key) const {
         const Json& value = member(key);
         if (!value.is_number()) wrong_type(key, "a number");
@@ -141,6 +150,8 @@ Json json_of(const SessionInfo& info) {
               {"rig", info.rig},       {"camera", info.camera},   {"planned_shots", info.planned_shots},
               {"notes", info.notes}};
     if (info.geometry) json["geometry"] = json_of(*info.geometry);
+    if (!info.record.inventory.empty()) json["inventory"] = info.record.inventory;
+    if (!info.record.dublin_core.empty()) json["dublin_core"] = info.record.dublin_core;
     return json;
 }
 
@@ -194,6 +205,18 @@ CaptureGeometry geometry_from(const Fields& fields) {
     return geometry;
 }
 
+/// Absent in sessions of earlier darkboxes, and where nothing is known.
+ObjectRecord object_record_from(const Fields& fields) {
+    ObjectRecord record;
+    if (fields.has("inventory")) record.inventory = fields.text("inventory");
+    if (!fields.has("dublin_core")) return record;
+    const Json& elements = fields.member("dublin_core");
+    if (!elements.is_object()) refuse(fields.where(), "\"dublin_core\" is not an object");
+    for (const auto& [element, values] : elements.items())
+        record.dublin_core[element] = Fields(fields.where(), elements).texts(element.c_str());
+    return record;
+}
+
 SessionInfo info_from(const Fields& fields) {
     SessionInfo info;
     info.object = fields.text("object");
@@ -202,10 +225,8 @@ SessionInfo info_from(const Fields& fields) {
     info.rig = fields.text("rig");
     info.camera = fields.text("camera");
     info.planned_shots = fields.integer<int>("planned_shots");
-    for (const Json& note : fields.array("notes")) {
-        if (!note.is_string()) refuse(fields.where(), "\"notes\" is not a list of texts");
-        info.notes.push_back(note.get<std::string>());
-    }
+    info.notes = fields.texts("notes");
+    info.record = object_record_from(fields);
     if (fields.has("geometry")) info.geometry = geometry_from({fields.where(), fields.member("geometry")});
     require_valid(fields.where(), info);
     return info;

@@ -67,7 +67,9 @@ void keep_rig(SessionWriter& writer, const RigDescription& rig) {
 Begun create(const CaptureRequest& request, const RigDescription& rig, Camera& camera) {
     CapturePlan plan = plan_capture(rig, request.lamps);
     const CameraInfo info = camera.configure(plan.shots.front().camera);
-    SessionWriter writer = SessionWriter::create(request.folder, session_info(rig, info, request.object, plan));
+    SessionInfo head = session_info(rig, info, request.object, plan);
+    head.record = request.record;
+    SessionWriter writer = SessionWriter::create(request.folder, head);
     keep_rig(writer, rig);
     return {std::move(writer), std::move(plan)};
 }
@@ -120,7 +122,8 @@ CapturedSession capture_session(const CaptureRequest& request, const RigDescript
     CaptureSummary summary;
     {
         SessionRecorder recorder(begun.writer);
-        summary = run_capture(begun.plan, rig, {lamps, camera, clock}, recorder, work, timings);
+        ToldSink told(recorder, request.listener);
+        summary = run_capture(begun.plan, rig, {lamps, camera, clock}, told, work, timings);
         recorder.finish();
     }
     return {begun.writer.seal(), summary};

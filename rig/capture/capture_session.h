@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "rig/capture/capture_run.h"
+#include "rig/capture/told_sink.h"
 
 namespace darkbox {
 
@@ -19,6 +20,8 @@ struct CaptureRequest {
     std::vector<std::string> lamps;  ///< names; empty = all, or the interrupted session's own
     CaptureStart start = CaptureStart::create;
     std::optional<SyncMode> mode = {};  ///< none: the one of rig.toml
+    ObjectRecord record = {};           ///< of the object; a resumed session keeps its own
+    CaptureListener listener = {};
 };
 
 struct CapturedSession {

@@ -13,7 +13,7 @@ using Json = nlohmann::json;
 
 constexpr std::size_t longest_text = 200;  ///< bytes
 constexpr std::size_t most_lamps = 1024;
-constexpr const char* known_kinds = "known: capture, recalibrate, calibrate, process, export";
+constexpr const char* known_kinds = "known: capture, recalibrate, calibrate, process, export, prune";
 
 std::string text(const Json& value, const std::string& key) {
     if (!value.is_string()) throw InputError(fmt::format("\"{}\" is not a string", key), "put it in quotes");
@@ -36,6 +36,21 @@ std::vector<std::string> texts(const Json& value, const std::string& key) {
     return result;
 }
 
+/// {"title": "A vase", "creator": ["A", "B"]}
+void add_dublin_core(const Json& value, ObjectRecord& record) {
+    const std::string where = "\"dublin_core\"";
+    if (!value.is_object()) throw InputError(where + " is not an object", R"(write {"title": "A vase"})");
+    for (const auto& [element, values] : value.items()) {
+        for (const Json& one : values.is_array() ? values : Json::array({values})) {
+            if (!one.is_string())
+                throw InputError(where + " holds something that is neither a string nor a list of them",
+                                 R"(write {"creator": ["A", "B"]})");
+            add_value(where, record, element, one.get<std::string>());
+        }
+    }
+    require_valid(where, record);
+}
+
 }  // namespace
 
 Json parse_object(const std::string& body) {
@@ -56,6 +71,10 @@ CaptureOrder capture_order_from(const Json& json) {
             order.resume = text(value, key);
         } else if (key == "lamps") {
             order.lamps = texts(value, key);
+        } else if (key == "inventory") {
+            order.record.inventory = text(value, key);
+        } else if (key == "dublin_core") {
+            add_dublin_core(value, order.record);
         } else if (key == "mode") {
             order.mode = sync_mode_from_name(text(value, key));
             if (!order.mode)
@@ -63,7 +82,7 @@ CaptureOrder capture_order_from(const Json& json) {
                                  "known: settled, predictive, strobed");
         } else if (key != "process") {  // what is to follow is the queue's concern
             throw InputError(fmt::format("unknown key \"{}\"", key.substr(0, longest_text)),
-                             "known: object, lamps, mode, name, resume");
+                             "known: object, inventory, dublin_core, lamps, mode, name, resume");
         }
     }
     return order;
@@ -82,6 +101,13 @@ Job job_from(const Json& body) {
         if (const auto process = body.find("process"); process != body.end() && !process->is_boolean())
             throw InputError("\"process\" is not true or false", "leave it out, or write true");
         (void)capture_order_from(job.orders);
+        return job;
+    }
+    if (job.kind == JobKind::prune) {
+        for (const auto& [key, value] : job.orders.items())
+            if (key != "dry_run" || !value.is_boolean())
+                throw InputError(fmt::format("unknown key \"{}\"", key.substr(0, longest_text)),
+                                 "known: kind, and dry_run: true or false");
         return job;
     }
     for (const auto& [key, value] : job.orders.items()) {
@@ -114,6 +140,8 @@ Json to_json(const CaptureOrder& order) {
     if (!order.object.empty()) json["object"] = order.object;
     if (!order.name.empty()) json["name"] = order.name;
     if (!order.lamps.empty()) json["lamps"] = order.lamps;
+    if (!order.record.inventory.empty()) json["inventory"] = order.record.inventory;
+    if (!order.record.dublin_core.empty()) json["dublin_core"] = order.record.dublin_core;
     if (order.mode) json["mode"] = name(*order.mode);
     if (order.resume) json["resume"] = *order.resume;
     return json;

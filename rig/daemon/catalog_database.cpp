@@ -44,6 +44,13 @@ CREATE TABLE drift (
     role TEXT NOT NULL, steady INTEGER NOT NULL, alarm TEXT NOT NULL, findings TEXT NOT NULL,
     PRIMARY KEY (session, role)
 ) WITHOUT ROWID;
+)sql",
+    // Every session is read again for them.
+    R"sql(
+ALTER TABLE sessions ADD COLUMN inventory TEXT NOT NULL DEFAULT '';
+ALTER TABLE sessions ADD COLUMN dublin_core TEXT NOT NULL DEFAULT '{}';
+ALTER TABLE sessions ADD COLUMN words TEXT NOT NULL DEFAULT '';
+UPDATE sessions SET stamp = '';
 )sql"};
 static_assert(migrations.size() == catalog_version);
 

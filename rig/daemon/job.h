@@ -19,6 +19,7 @@ struct CaptureOrder {
     std::optional<SyncMode> mode = {};       ///< none: the one of rig.toml
     std::string name = {};                   ///< of the session; empty = made from object and date
     std::optional<std::string> resume = {};  ///< name of an interrupted session
+    ObjectRecord record = {};                ///< of the object
 };
 
 enum class JobKind {
@@ -27,6 +28,7 @@ enum class JobKind {
     calibrate,
     process,     ///< all stages, then the report
     export_map,  ///< into another program's format
+    prune,       ///< removes sessions by the rules of [retention]; has no session of its own
 };
 std::string_view name(JobKind kind);
 std::optional<JobKind> job_kind_from_name(std::string_view name);

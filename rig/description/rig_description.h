@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "acquisition/frame/units.h"
+#include "rig/description/retention_rules.h"
 
 namespace darkbox {
 
@@ -109,7 +110,8 @@ struct RigDescription {
     std::string socket_group;               ///< [api] group: whose members may use the socket; empty = only the owner
     std::string listen;                     ///< [api] listen: "127.0.0.1:7640"; empty = no TCP
     std::filesystem::path token_file;       ///< [api] token_file, for TCP; empty = beside the socket
-    std::string toml;                       ///< the text it came from, byte for byte
+    std::optional<RetentionRules> retention = {};  ///< none: sessions are never removed
+    std::string toml;                              ///< the text it came from, byte for byte
 };
 
 /// Strict: an unknown key or a wrong type is an InputError that names the line and the nearest known key; a value out

@@ -70,6 +70,34 @@ protected:
     TemporaryFolder folder_;
 };
 
+TEST_F(CatalogTest, FindsWords) {
+    for (const char* name : {"cup", "vase"}) {
+        SessionInfo info;
+        info.object = std::string("a ") + name;
+        info.created = "2026-01-01T00:00:00.000Z";
+        info.source = "import";
+        info.record.inventory = std::string("1907.") + name;
+        info.record.dublin_core["creator"] = {"A Potter", "100% _B_"};
+        SessionWriter::create(folder_.path() / name, info).seal();
+    }
+    Catalog catalog(folder_.path());
+    catalog.refresh();
+    const auto found = [&](const std::string& words) { return names(catalog.sessions({}, words)); };
+    EXPECT_THAT(found(""), ElementsAre("cup", "vase"));
+    EXPECT_THAT(found("potter"), ElementsAre("cup", "vase"));
+    EXPECT_THAT(found("POTTER  1907.Vase"), ElementsAre("vase"));
+    EXPECT_THAT(found("potter bowl"), IsEmpty());
+    EXPECT_THAT(found("100% _b_"), ElementsAre("cup", "vase"));  // nothing stands for anything else
+    EXPECT_THAT(found("1_07"), IsEmpty());
+    EXPECT_THAT(found("' OR 1=1 --"), IsEmpty());
+    EXPECT_EQ(catalog.session_count("vase"), 1U);
+    EXPECT_THAT(names(catalog.sessions({.after = "cup", .limit = 1}, "potter")), ElementsAre("vase"));
+    const auto vase = catalog.session("vase");
+    ASSERT_TRUE(vase);
+    EXPECT_EQ(vase->record.inventory, "1907.vase");
+    EXPECT_EQ(vase->record.dublin_core.at("creator"), (std::vector<std::string>{"A Potter", "100% _B_"}));
+}
+
 TEST_F(CatalogTest, KnowsWhatLiesOnDisk) {
     seal("cup");
     {
