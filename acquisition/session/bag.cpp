@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <unordered_set>
 #include <utility>
 
@@ -54,22 +55,54 @@ std::string percent_decode(std::string_view text) {
 
 /// A value of bag-info.txt stays on its line.
 std::string one_line(std::string text) {
-    std::replace_if(text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+    std::replace_if(
+        text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+    return text;
+}
+
+/// "Label: value". A line break goes on in a line that begins with white space (RFC 8493, section 2.2.2: the break
+/// belongs to the value, the padding does not, so a line's own leading blanks cannot be kept). Long lines are left
+/// whole, as any other break would change the value.
+std::string tag(std::string_view label, std::string_view value) {
+    std::string text = fmt::format("{}:", label);
+    for (std::string_view rest = value;;) {
+        const std::size_t end = std::min(rest.find('\n'), rest.size());
+        std::string_view line = rest.substr(0, end);
+        line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
+        text += fmt::format(" {}\n", line);
+        if (end == rest.size()) return text;
+        rest.remove_prefix(end + 1);
+    }
+}
+
+/// "DC-Title: A vase", a line for each value; elements beyond the reserved ones are allowed (section 2.2.2).
+std::string object_tags(const SessionInfo& info) {
+    std::string text;
+    if (!info.object.empty()) text += tag("Object", one_line(info.object));
+    if (!info.record.inventory.empty()) text += tag("Inventory-Number", info.record.inventory);
+    for (const auto& [element, values] : info.record.dublin_core) {
+        std::string label = "DC-" + element;
+        label[3] = static_cast<char>(std::toupper(static_cast<unsigned char>(label[3])));
+        for (const std::string& value : values) text += tag(label, value);
+    }
     return text;
 }
 
 std::string bag_info_text(const SessionContents& contents, const Payload& document) {
     std::uint64_t bytes = document.size;
     for (const Payload& payload : contents.payloads) bytes += payload.size;
+    const std::string identifier =
+        contents.info.record.inventory.empty() ? one_line(contents.info.object) : contents.info.record.inventory;
     return fmt::format(
         "Bag-Software-Agent: darkbox\n"
         "Bagging-Date: {}\n"
         "External-Identifier: {}\n"
         "External-Description: photometric session of {}: {} frames, {} of {}\n"
-        "Payload-Oxum: {}.{}\n",
-        iso8601_now().substr(0, 10), one_line(contents.info.object), one_line(contents.info.object),
-        contents.frames.size(), one_line(contents.info.source), one_line(contents.info.created), bytes,
-        contents.payloads.size() + 1);
+        "Payload-Oxum: {}.{}\n"
+        "{}",
+        iso8601_now().substr(0, 10), identifier, one_line(contents.info.object), contents.frames.size(),
+        one_line(contents.info.source), one_line(contents.info.created), bytes, contents.payloads.size() + 1,
+        object_tags(contents.info));
 }
 
 std::string payload_manifest(const SessionContents& contents, const Payload& document) {

@@ -142,6 +142,7 @@ void require_valid(const std::string& where, const SessionInfo& info) {
             refuse(where, "retakes", shown(info.retakes->name), "the name of a session's folder");
         require_sha256(where, info.retakes->manifest_sha256);
     }
+    require_valid(where, info.record);
 }
 
 void require_valid(const std::string& where, const FrameRecord& record) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "acquisition/frame/ids.h"
+#include "acquisition/session/object_record.h"
 
 namespace darkbox {
 
@@ -63,8 +64,8 @@ struct FrameRecord {
     std::int64_t lamp_on_ns = 0;
     std::int64_t lamp_off_ns = 0;
     bool verified = false;
-    std::string verification;  ///< what was checked and found, in words
-    std::string sha256;        ///< of the file, lower-case hex; filled by SessionWriter
+    std::string verification;               ///< what was checked and found, in words
+    std::string sha256;                     ///< of the file, lower-case hex; filled by SessionWriter
     std::optional<SensorNoise> noise = {};  ///< of captured frames, where it was measured
     std::string taken_over_from = {};       ///< the session that it was captured in; empty: this one
 
@@ -109,6 +110,7 @@ struct SessionInfo {
     std::vector<std::string> notes;  ///< choices made on the way in, such as the transfer curve, in words
     std::optional<CaptureGeometry> geometry = {};
     std::optional<SessionReference> retakes = {};  ///< the session of which this one takes some lamps again
+    ObjectRecord record = {};                      ///< of the object
 };
 
 /// A sealed session, read only. Thread-compatible; const members are thread-safe.

@@ -64,6 +64,15 @@ public:
         return value.get<std::string>();
     }
 
+    std::vector<std::string> texts(const char* key) const {
+        std::vector<std::string> texts;
+        for (const Json& element : array(key)) {
+            if (!element.is_string()) wrong_type(key, "a list of texts");
+            texts.push_back(element.get<std::string>());
+        }
+        return texts;
+    }
+
     double number(const char* key) const {
         const Json& value = member(key);
         if (!value.is_number()) wrong_type(key, "a number");
@@ -143,6 +152,8 @@ Json json_of(const SessionInfo& info) {
     if (info.geometry) json["geometry"] = json_of(*info.geometry);
     if (info.retakes)
         json["retakes"] = {{"session", info.retakes->name}, {"manifest_sha256", info.retakes->manifest_sha256}};
+    if (!info.record.inventory.empty()) json["inventory"] = info.record.inventory;
+    if (!info.record.dublin_core.empty()) json["dublin_core"] = info.record.dublin_core;
     return json;
 }
 
@@ -150,24 +161,24 @@ Json json_of(const SessionEvent& event) { return {{"when", event.when}, {"what",
 
 Json json_of(const FrameRecord& record) {
     Json json{{"file", record.file},
-            {"kind", name(record.kind)},
-            {"format", record.format},
-            {"width", record.width},
-            {"height", record.height},
-            {"bit_depth", record.bit_depth},
-            {"black_level", record.black_level},
-            {"transfer", name(record.transfer)},
-            {"lamp", record.lamp ? Json(record.lamp->value) : Json()},
-            {"lamp_name", record.lamp_name},
-            {"exposure_s", record.exposure_s},
-            {"gain", record.gain},
-            {"sequence", record.sequence},
-            {"timestamp_ns", record.timestamp_ns},
-            {"lamp_on_ns", record.lamp_on_ns},
-            {"lamp_off_ns", record.lamp_off_ns},
-            {"verified", record.verified},
-            {"verification", record.verification},
-            {"sha256", record.sha256}};
+              {"kind", name(record.kind)},
+              {"format", record.format},
+              {"width", record.width},
+              {"height", record.height},
+              {"bit_depth", record.bit_depth},
+              {"black_level", record.black_level},
+              {"transfer", name(record.transfer)},
+              {"lamp", record.lamp ? Json(record.lamp->value) : Json()},
+              {"lamp_name", record.lamp_name},
+              {"exposure_s", record.exposure_s},
+              {"gain", record.gain},
+              {"sequence", record.sequence},
+              {"timestamp_ns", record.timestamp_ns},
+              {"lamp_on_ns", record.lamp_on_ns},
+              {"lamp_off_ns", record.lamp_off_ns},
+              {"verified", record.verified},
+              {"verification", record.verification},
+              {"sha256", record.sha256}};
     if (record.noise) json["noise"] = {{"floor", record.noise->floor}, {"slope", record.noise->slope}};
     if (!record.taken_over_from.empty()) json["taken_over_from"] = record.taken_over_from;
     return json;
@@ -199,6 +210,18 @@ CaptureGeometry geometry_from(const Fields& fields) {
     return geometry;
 }
 
+/// Absent in sessions of earlier darkboxes, and where nothing is known.
+ObjectRecord object_record_from(const Fields& fields) {
+    ObjectRecord record;
+    if (fields.has("inventory")) record.inventory = fields.text("inventory");
+    if (!fields.has("dublin_core")) return record;
+    const Json& elements = fields.member("dublin_core");
+    if (!elements.is_object()) refuse(fields.where(), "\"dublin_core\" is not an object");
+    for (const auto& [element, values] : elements.items())
+        record.dublin_core[element] = Fields(fields.where(), elements).texts(element.c_str());
+    return record;
+}
+
 SessionInfo info_from(const Fields& fields) {
     SessionInfo info;
     info.object = fields.text("object");
@@ -207,10 +230,8 @@ SessionInfo info_from(const Fields& fields) {
     info.rig = fields.text("rig");
     info.camera = fields.text("camera");
     info.planned_shots = fields.integer<int>("planned_shots");
-    for (const Json& note : fields.array("notes")) {
-        if (!note.is_string()) refuse(fields.where(), "\"notes\" is not a list of texts");
-        info.notes.push_back(note.get<std::string>());
-    }
+    info.notes = fields.texts("notes");
+    info.record = object_record_from(fields);
     if (fields.has("geometry")) info.geometry = geometry_from({fields.where(), fields.member("geometry")});
     if (fields.has("retakes")) {
         const Fields reference(fields.where(), fields.member("retakes"));

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <vector>
 
 #include "processing/relight/ptm.h"
 
@@ -16,7 +17,8 @@ void write_ptm(const std::filesystem::path& path, const Ptm& ptm);
 /// The same as a folder for viewers in a browser (Relight, OpenLIME): info.json and plane_0.jpg, plane_1.jpg...; a
 /// value is (sample - bias) scale with samples on 0...1, terms in the order 1, u, v, u^2, uv, v^2. RGB: one picture per
 /// term. LRGB: the colour, then three terms to a picture. JPEG without chroma subsampling at `quality` (1...100).
-/// `lights` are listed. Throws InputError when the folder cannot be written.
-void write_relight_web(const std::filesystem::path& folder, const Ptm& ptm, const Lights& lights, int quality = 95);
+/// `lights` are listed. Returns the pictures. Throws InputError when the folder cannot be written.
+std::vector<std::filesystem::path> write_relight_web(const std::filesystem::path& folder, const Ptm& ptm,
+                                                     const Lights& lights, int quality = 95);
 
 }  // namespace darkbox

@@ -73,9 +73,11 @@ ordered_json info_of(const Ptm& ptm, const Lights& lights, int quality, const st
 
 }  // namespace
 
-void write_relight_web(const std::filesystem::path& folder, const Ptm& ptm, const Lights& lights, int quality) {
+std::vector<std::filesystem::path> write_relight_web(const std::filesystem::path& folder, const Ptm& ptm,
+                                                     const Lights& lights, int quality) {
     const std::size_t pictures = ptm.model == PtmModel::rgb ? 6 : 3;
     std::vector<ByteRange> ranges;
+    std::vector<std::filesystem::path> written;
     for (std::size_t picture = 0; picture < pictures; ++picture) {
         std::vector<cv::Mat> channels;
         for (int channel = 0; channel < 3; ++channel) {
@@ -85,9 +87,11 @@ void write_relight_web(const std::filesystem::path& folder, const Ptm& ptm, cons
         }
         cv::Mat3b image;
         cv::merge(channels, image);
-        write_file(folder / ("plane_" + std::to_string(picture) + ".jpg"), encode_data_jpeg(image, quality));
+        written.push_back(folder / ("plane_" + std::to_string(picture) + ".jpg"));
+        write_file(written.back(), encode_data_jpeg(image, quality));
     }
     write_json(folder / "info.json", info_of(ptm, lights, quality, ranges));
+    return written;
 }
 
 }  // namespace darkbox

@@ -13,6 +13,7 @@
 #include "processing/maps/parallel.h"
 #include "processing/maps/photo_source.h"
 #include "processing/maps/srgb.h"
+#include "processing/pipeline/provenance.h"
 #include "processing/pipeline/radiance.h"
 #include "processing/pipeline/session_files.h"
 #include "processing/pipeline/stack.h"
@@ -69,6 +70,7 @@ void export_diligent(const Session& session, const fs::path& out, const WorkCont
     write_png(out / "mask.png", load_mask(session, work));
     Lights lights;
     std::string names;
+    std::vector<fs::path> pictures;
     for_each_photograph(session, "exporting", work, [&](std::size_t i, const Radiance& photograph) {
         if (!all[i].used) return;
         lights.push_back(all[i]);
@@ -77,7 +79,9 @@ void export_diligent(const Session& session, const fs::path& out, const WorkCont
         const std::string name = fmt::format("{:03}.png", lights.size());
         write_png(out / name, sixteen_bit(photograph.image, scale));
         names += name + "\n";
+        pictures.push_back(out / name);
     });
+    describe_pictures(session, "photograph, linear", pictures);
     write_light_directions(out / "light_directions.txt", lights);
     write_light_intensities(out / "light_intensities.txt", lights);
     write_file(out / "filenames.txt", names);
@@ -130,7 +134,8 @@ Ptm fitted_ptm(const Session& session, const Lights& lights, PtmModel model, con
 
 void export_web(const Session& session, PtmModel model, const fs::path& out, const WorkContext& work) {
     const Lights lights = load_lights(session);
-    write_relight_web(out, fitted_ptm(session, lights, model, work), lights);
+    describe_pictures(session, "polynomial texture map",
+                      write_relight_web(out, fitted_ptm(session, lights, model, work), lights));
 }
 
 }  // namespace

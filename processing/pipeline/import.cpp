@@ -261,6 +261,7 @@ Session import_photographs(const ImportOptions& options, const WorkContext& work
     info.object = options.object.empty() ? name_of_folder(options.folders.front()) : options.object;
     info.created = iso8601_now();
     info.source = "import";
+    info.record = options.record;
     info.planned_shots = static_cast<int>(all.size());
     info.notes = notes_of(found, options, extras);
     if (options.ball_diameter_mm) {

@@ -34,7 +34,8 @@ struct ImportOptions {
     std::optional<std::filesystem::path> lights;       ///< any form that read_lights() knows
     ImportTransfer transfer = ImportTransfer::automatic;
     ImportLayout layout = ImportLayout::automatic;
-    std::string object;  ///< empty: the first folder's name
+    std::string object;        ///< empty: the first folder's name
+    ObjectRecord record = {};  ///< what else is known of it
 
     /// Throws InputError that names the field.
     void validate() const;

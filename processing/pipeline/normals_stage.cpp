@@ -19,6 +19,7 @@
 #include "processing/pipeline/angular_error.h"
 #include "processing/pipeline/frame_tally.h"
 #include "processing/pipeline/lights_check.h"
+#include "processing/pipeline/provenance.h"
 #include "processing/pipeline/session_files.h"
 #include "processing/pipeline/solved.h"
 #include "processing/pipeline/stack.h"
@@ -218,6 +219,8 @@ NormalsSummary run_normals(const Session& session, const NormalsOptions& options
     if (options.surface) summary.height = write_surface(files, solved.stereo, solved.calibration.view, work);
     summary.seconds.write = watch.lap();
     write_json(files.results_summary, to_json(summary));
+    describe_pictures(session, "normals", {files.normals_png});
+    describe_pictures(session, "albedo", {files.albedo_png});
     step(work, {"writing maps", 1, 1, ""});
     return summary;
 }

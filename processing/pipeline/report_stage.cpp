@@ -15,6 +15,7 @@
 #include "processing/pipeline/ball_picture.h"
 #include "processing/pipeline/default_relit.h"
 #include "processing/pipeline/false_colour.h"
+#include "processing/pipeline/provenance.h"
 #include "processing/pipeline/session_files.h"
 #include "processing/pipeline/stack.h"
 #include "processing/pipeline/stages.h"
@@ -201,6 +202,7 @@ std::vector<fs::path> add_relit(const Session& session, const ResultFiles& files
         write_png(written.back(), picture.image);
         content.relit.push_back({std::move(picture.image), picture.name, picture.caption});
     }
+    describe_pictures(session, "relit", written);
     return written;
 }
 

@@ -5,6 +5,7 @@
 #include "acquisition/frame/error.h"
 #include "processing/formats/json_file.h"
 #include "processing/formats/map_files.h"
+#include "processing/pipeline/provenance.h"
 #include "processing/pipeline/session_files.h"
 #include "processing/pipeline/session_geometry.h"
 #include "processing/pipeline/stack.h"
@@ -55,6 +56,7 @@ TexelsSummary run_texels(const Session& session, const TexelOptions& options, co
     write_index_map(files.index, clustered.index);
     summary.seconds.write = watch.lap();
     write_json(files.texels, to_json(summary));
+    describe_pictures(session, "texels", {files.index});
     step(work, {"clustering texels", 1, 1, ""});
     return summary;
 }

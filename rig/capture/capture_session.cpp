@@ -100,8 +100,8 @@ Begun create(const CaptureRequest& request, RigDescription& rig, const CaptureDe
     const Seconds described = rig.camera.exposure;
     const auto metered = settle_exposure(request, rig, devices, work, timings);
     CapturePlan plan = plan_capture(rig, request.lamps);
-    SessionInfo info =
-        session_info(rig, devices.camera.configure(plan.shots.front().camera), request.object, plan);
+    SessionInfo info = session_info(rig, devices.camera.configure(plan.shots.front().camera), request.object, plan);
+    info.record = request.record;
     if (rig.camera.exposure != described)
         info.notes.push_back(fmt::format("{}{}", exposure_note, rig.camera.exposure.count() * 1e6));
     SessionWriter writer = SessionWriter::create(request.folder, info);
@@ -130,6 +130,7 @@ Begun create_retake(const CaptureRequest& request, const RigDescription& rig, Ca
     SessionInfo info =
         session_info(rig, present, request.object.empty() ? old.info().object : request.object, retake.plan);
     info.planned_shots = static_cast<int>(retake.order.size());
+    info.record = request.record.empty() ? old.info().record : request.record;
     info.retakes = retake.of;
     SessionWriter writer = SessionWriter::create(request.folder, info);
     keep_rig(writer, rig);
@@ -211,7 +212,8 @@ CapturedSession capture_session(const CaptureRequest& request, const RigDescript
     CaptureSummary summary;
     {
         SessionRecorder recorder(begun.writer);
-        summary = run_capture(begun.plan, rig, devices, recorder, work, timings);
+        ToldSink told(recorder, request.listener);
+        summary = run_capture(begun.plan, rig, devices, told, work, timings);
         recorder.finish();
     }
     return {begun.writer.seal(begun.order), summary};

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "rig/capture/capture_run.h"
+#include "rig/capture/told_sink.h"
 
 namespace darkbox {
 
@@ -24,10 +25,12 @@ struct CaptureRequest {
     std::string object;              ///< name given by the user; a resumed session keeps its own
     std::vector<std::string> lamps;  ///< names; empty = all, or the interrupted session's own
     CaptureStart start = CaptureStart::create;
-    std::optional<SyncMode> mode = {};  ///< none: the one of rig.toml
+    std::optional<SyncMode> mode = {};            ///< none: the one of rig.toml
     std::optional<ExposureChoice> exposure = {};  ///< none: as rig.toml says; a resumed session keeps its own
     /// A sealed session of which `lamps` are taken again: the new one refers to it and takes the rest over.
     std::optional<std::filesystem::path> retake = {};
+    ObjectRecord record = {};  ///< of the object; a resumed session keeps its own
+    CaptureListener listener = {};
 };
 
 struct CapturedSession {
@@ -42,10 +45,10 @@ CaptureGeometry geometry_of(const RigDescription& rig);
 SessionInfo session_info(const RigDescription& rig, const CameraInfo& camera, const std::string& object,
                          const CapturePlan& plan);
 
-/// The whole capture: meters where that is asked for, starts or resumes the session, keeps rig.toml in it, takes every shot, seals. Lamps are dark when
-/// it returns or throws; whatever was acknowledged stays and can be resumed. Throws what run_capture() throws, and
-/// InputError when an interrupted session was begun with another rig.toml or other lamps, and what meter_exposure()
-/// and plan_retake() throw.
+/// The whole capture: meters where that is asked for, starts or resumes the session, keeps rig.toml in it, takes every
+/// shot, seals. Lamps are dark when it returns or throws; whatever was acknowledged stays and can be resumed. Throws
+/// what run_capture() throws, and InputError when an interrupted session was begun with another rig.toml or other
+/// lamps, and what meter_exposure() and plan_retake() throw.
 CapturedSession capture_session(const CaptureRequest& request, const RigDescription& rig, LampArray& lamps,
                                 Camera& camera, Clock& clock, const WorkContext& work = {},
                                 const TimingLookup& timings = {});

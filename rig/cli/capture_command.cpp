@@ -8,6 +8,9 @@
 #include <sstream>
 
 #include "acquisition/device/device_error.h"
+#include "rig/cli/capture_series.h"
+#include "rig/cli/followed_job.h"
+#include "rig/cli/object_options.h"
 #include "rig/cli/rig_commands.h"
 #include "rig/daemon/capture_order_json.h"
 #include "rig/daemon/client.h"
@@ -24,14 +27,18 @@ struct Arguments {
     fs::path rig;
     int simulate = 0;  ///< lamps of the built-in simulated rig; 0 = not asked for
     std::string object;
+    ObjectOptions about;
     std::string plan = "all";
-    std::string mode;  ///< empty: the rig's own
+    std::string mode;      ///< empty: the rig's own
     std::string exposure;  ///< "auto" or microseconds; empty: the rig's own
     fs::path retake;
     fs::path resume;
     fs::path out;
     fs::path socket;
     bool standalone = false;
+    int repeat = 1;
+    std::string between;  ///< command; empty: none
+    int between_timeout_s = 60;
 };
 
 /// "auto", or microseconds; none for an empty text.
@@ -73,6 +80,7 @@ CaptureRequest request_for(const Arguments& a) {
     CaptureRequest request{
         .folder = a.out, .object = a.object, .lamps = lamps_of_plan(a.plan), .mode = sync_mode_from_name(a.mode)};
     request.exposure = exposure_of(a.exposure);
+    request.record = object_record(a.about);
     const fs::path folder = default_sessions_folder();
     if (!a.retake.empty()) request.retake = fs::exists(a.retake) ? a.retake : folder / a.retake;
     if (!a.resume.empty()) {
@@ -114,58 +122,15 @@ CommandResult capture_here(const Arguments& a, const WorkContext& work) {
 
 // Through the daemon.
 
-/// Follows one job from its acceptance to its last event.
-class FollowedJob {
-public:
-    FollowedJob(const DaemonClient& client, const EventJson& job, const WorkContext& work)
-        : client_(client), id_(job.at("id")), session_(job.at("session")), first_event_(job.at("event")), work_(work) {}
-
-    EventJson end() {
-        try {
-            client_.follow_events(first_event_, {.event = [this](const EventJson& event) { return hear(event); },
-                                                 .idle = [this] { cancel_if_asked(); }});
-        } catch (const DeviceError& error) {
-            stopped_early(fmt::format(": {}", error.what()));
-        }
-        if (end_.is_null()) stopped_early("");
-        return std::move(end_);
-    }
-
-private:
-    [[noreturn]] void stopped_early(const std::string& why) const {
-        throw DeviceError("darkboxd stopped before the capture was done" + why,
-                          fmt::format("start it again, then: darkbox capture --resume {}", session_));
-    }
-
-    DaemonClient::Follow hear(const EventJson& event) {
-        cancel_if_asked();
-        if (event.value("job", std::uint64_t{0}) != id_) return DaemonClient::Follow::go_on;
-        if (event.at("event") == "progress") {
-            work_.tell({event.at("stage"), event.at("done"), event.at("total"), event.at("detail")});
-            return DaemonClient::Follow::go_on;
-        }
-        end_ = event;
-        return DaemonClient::Follow::leave;
-    }
-
-    void cancel_if_asked() {
-        if (!work_.cancelled() || asked_) return;
-        asked_ = true;
-        client_.call("DELETE", fmt::format("jobs/{}", id_));
-    }
-
-    const DaemonClient& client_;
-    const std::uint64_t id_;
-    const std::string session_;
-    const std::uint64_t first_event_;
-    const WorkContext& work_;
-    bool asked_ = false;
-    EventJson end_;
-};
+/// What to do when darkboxd stops in the midst of it.
+std::string resume_after(const EventJson& job) {
+    return fmt::format("start it again, then: darkbox capture --resume {}", job.at("session").get<std::string>());
+}
 
 CaptureOrder order_for(const Arguments& a, const DaemonClient& client) {
     CaptureOrder order{.object = a.object, .lamps = lamps_of_plan(a.plan), .mode = sync_mode_from_name(a.mode)};
     order.exposure = exposure_of(a.exposure);
+    order.record = object_record(a.about);
     if (a.out.empty() && a.resume.empty() && a.retake.empty()) return order;
     const std::string folder = client.call("GET", "status").at("sessions");
     if (!a.resume.empty()) order.resume = name_in_folder(a.resume, folder);
@@ -183,7 +148,7 @@ CaptureOrder order_for(const Arguments& a, const DaemonClient& client) {
 
 CommandResult capture_through(const DaemonClient& client, const Arguments& a, const WorkContext& work) {
     const EventJson job = client.call("POST", "captures", to_json(order_for(a, client)));
-    const EventJson end = FollowedJob(client, job, work).end();
+    const EventJson end = FollowedJob(client, job, work, resume_after(job)).end();
     if (end.at("event") == "done")
         return captured(end.at("folder"), end.at("frames"), end.at("repeated"), end.at("resumed"), end.at("seconds"));
     throw_end(end);
@@ -202,10 +167,10 @@ std::vector<std::string> alarms_of(const EventJson& session) {
 /// A capture of the ball and what follows from it: the calibration, compared with earlier ones.
 CommandResult recalibrate(const DaemonClient& client, const WorkContext& work) {
     const EventJson job = client.call("POST", "jobs", {{"kind", "recalibrate"}});
-    const EventJson captured = FollowedJob(client, job, work).end();
+    const EventJson captured = FollowedJob(client, job, work, resume_after(job)).end();
     if (captured.at("event") != "done") throw_end(captured);
     const EventJson next = client.call("GET", fmt::format("jobs/{}", captured.at("next").get<std::uint64_t>()));
-    const EventJson calibrated = FollowedJob(client, next, work).end();
+    const EventJson calibrated = FollowedJob(client, next, work, resume_after(job)).end();
     if (calibrated.at("event") != "done") throw_end(calibrated);
     const std::string session = captured.at("session");
     const EventJson stored = client.call("GET", "sessions/" + session);
@@ -220,16 +185,41 @@ CommandResult recalibrate(const DaemonClient& client, const WorkContext& work) {
     return result;
 }
 
+/// One capture, or as many as were asked for.
+template <class Capture>
+CommandResult capture_all(const Arguments& a, const fs::path& sessions, Capture capture, const WorkContext& work) {
+    if (a.repeat == 1) return capture(a);
+    CaptureSeries series{.object = a.object};
+    if (!a.between.empty()) series.between = Hook{split_words(a.between), std::chrono::seconds(a.between_timeout_s)};
+    // A name made of object and moment goes into the usual folder; the daemon takes names in its own.
+    fs::path base = a.out;
+    if (base.empty()) base = sessions / fresh_session_name(sessions, a.object, std::chrono::system_clock::now());
+    const auto into = [&](const fs::path& session) {
+        Arguments one = a;
+        one.out = session;
+        return capture(one);
+    };
+    return capture_series(series, numbered_names(base, a.repeat), into, work);
+}
+
 CommandResult run(const Arguments& a, const WorkContext& work) {
-    if (!a.resume.empty() && !(a.out.empty() && a.object.empty()))
-        throw InputError("a resumed session keeps its name and its object", "leave out --out and --object");
+    if (!a.resume.empty() && !(a.out.empty() && a.object.empty() && a.about.empty()))
+        throw InputError("a resumed session keeps its name and its object",
+                         "leave out --out, --object, --inventory and --meta");
     if (!a.resume.empty() && !(a.retake.empty() && a.exposure.empty()))
         throw InputError("a resumed session keeps its plan and its exposure", "leave out --retake and --exposure");
     if (!a.retake.empty() && !a.exposure.empty())
         throw InputError("a re-take keeps its session's exposure", "leave out --exposure");
-    if (a.plan == "recalibrate" && (!a.retake.empty() || !a.exposure.empty() || a.standalone || !a.resume.empty() || !a.out.empty()))
+    if (a.plan == "recalibrate" &&
+        (!a.retake.empty() || !a.exposure.empty() || a.standalone || !a.resume.empty() || !a.out.empty()))
         throw InputError("--plan recalibrate is darkboxd's to do, as a whole", "leave out the other options");
-    if (a.standalone) return capture_here(a, work);
+    if (a.repeat == 1 && !a.between.empty())
+        throw InputError("--between runs between captures, and there is one", "give --repeat N");
+    if (a.repeat > 1 && (!a.resume.empty() || !a.retake.empty() || a.plan == "recalibrate"))
+        throw InputError("--repeat makes new sessions", "leave out --resume, --retake and --plan recalibrate");
+    if (a.standalone)
+        return capture_all(
+            a, default_sessions_folder(), [&](const Arguments& one) { return capture_here(one, work); }, work);
     const DaemonClient client(a.socket.empty() ? default_socket() : a.socket);
     if (!client.answers())
         throw InputError(fmt::format("no darkboxd answers at {}", client.socket().string()),
@@ -237,7 +227,9 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
     if (!a.rig.empty() || a.simulate > 0)
         throw InputError("darkboxd has its rig already", "leave out --rig and --simulate, or add --standalone");
     if (a.plan == "recalibrate") return recalibrate(client, work);
-    return capture_through(client, a, work);
+    const fs::path folder = client.call("GET", "status").at("sessions").get<std::string>();
+    return capture_all(
+        a, folder, [&](const Arguments& one) { return capture_through(client, one, work); }, work);
 }
 
 }  // namespace
@@ -268,18 +260,22 @@ void add_capture_command(CommandLine& line) {
     const auto a = std::make_shared<Arguments>();
     CLI::App& command =
         line.add("capture", "Capture an object lamp by lamp, through darkboxd or in this process",
-                 "darkbox capture --object vase\n  darkbox capture --standalone --rig rig.toml --out vase\n  "
-                 "darkbox capture --retake vase --lamps lamp-03 --out vase-2",
+                 "darkbox capture --object vase --inventory 1907.12 --meta title=\"A vase\" --meta creator=\"A "
+                 "potter\"\n  darkbox capture --out vase --repeat 24 --between \"./turn.sh 15\"\n  "
+                 "darkbox capture --retake vase --lamps lamp-03 --out vase-2\n  "
+                 "darkbox capture --standalone --rig rig.toml --out vase",
                  [a](const WorkContext& work) { return run(*a, work); });
     auto* rig = command.add_option("--rig", a->rig, "The rig's description, with --standalone");
     command.add_option("--simulate", a->simulate, "A simulated rig of this many lamps, with --standalone")
         ->check(CLI::Range(3, 64))
         ->excludes(rig);
     command.add_option("--object", a->object, "Name of the object");
+    add_object_options(command, a->about);
     command.add_option("--plan,--lamps", a->plan, "all, names of lamps between commas, or recalibrate");
-    command.add_option("--exposure", a->exposure,
-                       "auto: metered, so that the object reaches 80 to 90 % of full scale; or microseconds; default: the "
-                       "rig's");
+    command.add_option(
+        "--exposure", a->exposure,
+        "auto: metered, so that the object reaches 80 to 90 % of full scale; or microseconds; default: the "
+        "rig's");
     command.add_option("--retake", a->retake,
                        "Take --lamps of this sealed session again, into a new one that takes the rest over");
     command
@@ -287,6 +283,14 @@ void add_capture_command(CommandLine& line) {
         ->check(CLI::IsMember({"settled", "predictive", "strobed"}));
     command.add_option("--resume", a->resume, "Go on with this interrupted session");
     command.add_option("--out", a->out, "The new session; default: made of object and date");
+    command.add_option("--repeat", a->repeat, "Captures one after the other, into sessions with numbers: OUT-001, ...")
+        ->check(CLI::Range(1, 10000));
+    command.add_option("--between", a->between,
+                       "A command to run between them, such as one that turns a table; without a shell. It finds "
+                       "DARKBOX_SESSION, _NEXT, _CAPTURED, _REPEAT and _OBJECT in its environment");
+    command.add_option("--between-timeout", a->between_timeout_s, "Seconds that it may take")
+        ->check(CLI::Range(1, 86400))
+        ->capture_default_str();
     command.add_flag("--standalone", a->standalone, "Drive the rig in this process, without darkboxd");
     command.add_option("--socket", a->socket, "Where darkboxd listens");
 }

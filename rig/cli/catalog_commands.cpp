@@ -13,12 +13,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::size_t everything = 1'000'000;
+
 struct Arguments {
     fs::path socket;
     fs::path folder;
     bool rebuild = false;
     std::uint64_t id = 0;
-    std::string format;
+    std::string find;
 };
 
 std::string text(const Json& json, const char* key) { return json.value(key, std::string()); }
@@ -30,11 +32,21 @@ Json ask(const DaemonClient& client, const std::string& method, const std::strin
     return Json::parse(client.call(method, target).dump());
 }
 
+/// For the value of a query (RFC 3986, section 2.3).
+std::string percent_encoded(const std::string& text) {
+    constexpr std::string_view plain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~";
+    std::string result;
+    for (const char c : text)
+        result +=
+            plain.find(c) != plain.npos ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+    return result;
+}
+
 /// Page after page of a list, as one.
-Json ask_for_all(const DaemonClient& client, const std::string& list) {
-    Json whole = ask(client, "GET", list + "?limit=1000");
+Json ask_for_all(const DaemonClient& client, const std::string& list, const std::string& query = "") {
+    Json whole = ask(client, "GET", fmt::format("{}?limit=1000{}", list, query));
     for (std::string next = text(whole, "next"); !next.empty();) {
-        const Json page = ask(client, "GET", fmt::format("{}?limit=1000&after={}", list, next));
+        const Json page = ask(client, "GET", fmt::format("{}?limit=1000&after={}{}", list, next, query));
         for (const Json& item : page.at(list)) whole.at(list).push_back(item);
         next = text(page, "next");
     }
@@ -53,14 +65,21 @@ std::optional<DaemonClient> daemon_of(const Arguments& a) {
 fs::path folder_of(const Arguments& a) { return a.folder.empty() ? default_sessions_folder() : a.folder; }
 
 Json describe(const SessionListing& session) {
-    return {{"name", session.name},       {"state", name(session.state)}, {"object", session.object},
-            {"created", session.created}, {"frames", session.frames},     {"problem", session.problem},
-            {"retakes", session.retakes}};
+    Json json{{"name", session.name},       {"state", name(session.state)}, {"object", session.object},
+              {"created", session.created}, {"frames", session.frames},     {"problem", session.problem},
+              {"retakes", session.retakes}};
+    if (!session.record.inventory.empty()) json["inventory"] = session.record.inventory;
+    if (!session.record.dublin_core.empty()) json["dublin_core"] = session.record.dublin_core;
+    return json;
 }
 
-Json sessions_on_disk(const fs::path& folder) {
+/// Read off the sessions themselves; nothing is written to their folder.
+Json sessions_on_disk(const fs::path& folder, const std::string& find) {
+    Catalog catalog(folder, Catalog::Place::in_memory);
+    catalog.refresh();
     Json list = Json::array();
-    for (const SessionListing& session : list_sessions(folder)) list.push_back(describe(session));
+    for (const SessionListing& session : catalog.sessions({.limit = everything}, find))
+        list.push_back(describe(session));
     return {{"folder", folder.string()}, {"sessions", list}};
 }
 
@@ -85,17 +104,20 @@ CommandResult sessions(const Arguments& a) {
     if (a.rebuild) return rebuild(a);
     CommandResult result;
     const auto client = daemon_of(a);
-    result.json = client ? ask_for_all(*client, "sessions") : sessions_on_disk(folder_of(a));
+    result.json = client ? ask_for_all(*client, "sessions", a.find.empty() ? "" : "&find=" + percent_encoded(a.find))
+                         : sessions_on_disk(folder_of(a), a.find);
     for (const Json& session : result.json.at("sessions")) {
-        result.text +=
-            fmt::format("{:<40} {:<12} {:>4} frames  {:<22} {}", text(session, "name"), text(session, "state"),
-                        session.at("frames").get<int>(), text(session, "created"), text(session, "object"));
+        result.text += fmt::format("{:<40} {:<12} {:>4} frames  {:<22} {:<12} {}", text(session, "name"),
+                                   text(session, "state"), session.at("frames").get<int>(), text(session, "created"),
+                                   text(session, "inventory"), text(session, "object"));
         const std::string retakes = text(session, "retakes");
         result.text += retakes.empty() ? "\n" : fmt::format(", retakes {}\n", retakes);
         if (const std::string problem = text(session, "problem"); !problem.empty())
             result.warnings.push_back(fmt::format("{}: {}", text(session, "name"), problem));
     }
-    if (result.text.empty()) result.text = fmt::format("no sessions in {}\n", text(result.json, "folder"));
+    if (result.text.empty())
+        result.text = fmt::format("no sessions {}in {}\n", a.find.empty() ? "" : "with these words ",
+                                  text(result.json, "folder"));
     result.text.pop_back();
     return result;
 }
@@ -105,7 +127,7 @@ Json calibrations_on_disk(const fs::path& folder) {
     Catalog catalog(folder, Catalog::Place::in_memory);
     catalog.refresh();
     Json list = Json::array();
-    for (const CatalogCalibration& calibration : catalog.calibrations({.limit = 1'000'000})) {
+    for (const CatalogCalibration& calibration : catalog.calibrations({.limit = everything})) {
         Json entry = Json::parse(to_json(calibration).dump());
         entry["drift"] = Json::array();
         for (const CatalogDrift& drift : catalog.drifts(calibration.session))
@@ -178,7 +200,8 @@ struct Added {
 Added add(CommandLine& line, const char* name, const char* description, const char* example, Run run,
           CLI::App* group = nullptr) {
     const auto a = std::make_shared<Arguments>();
-    CLI::App& command = line.add(name, description, example, [a, run](const WorkContext&) { return run(*a); }, group);
+    CLI::App& command = line.add(
+        name, description, example, [a, run](const WorkContext&) { return run(*a); }, group);
     command.add_option("--socket", a->socket, "Where darkboxd listens");
     return {command, a};
 }
@@ -192,9 +215,13 @@ void take_folder(const Added& added) {
 }  // namespace
 
 void add_catalog_commands(CommandLine& line) {
-    const Added list = add(line, "sessions", "The captured sessions", "darkbox sessions --folder sessions", sessions);
+    const Added list =
+        add(line, "sessions", "The captured sessions", "darkbox sessions --find \"vase 1907\"", sessions);
     take_folder(list);
+    list.command.add_option("--find", list.arguments->find,
+                            "Only sessions with all of these words in name, object, inventory number or Dublin Core");
     list.command.add_flag("--rebuild", list.arguments->rebuild, "Make the catalogue again from what is on disk");
+    add_prune_command(line, list.command);
     take_folder(add(line, "calibrations", "Every calibration, and what moved since the last and the first one",
                     "darkbox calibrations", calibrations));
 

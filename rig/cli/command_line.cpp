@@ -74,7 +74,10 @@ CLI::App& CommandLine::add(const std::string& name, const std::string& descripti
     command.add_flag("--progress-lines", progress_lines_, "Tell progress as lines of JSON on stderr")->group("");
     command.add_option("--threads", threads_, "Threads to use; 0 = all cores")->check(CLI::Range(0, 1024));
     command.footer("Example:\n  " + example);
-    command.callback([this, body = std::move(body)] { chosen_ = body; });
+    // A command with commands below it is only meant where none of those is.
+    command.callback([this, &command, body = std::move(body)] {
+        if (command.get_subcommands().empty()) chosen_ = body;
+    });
     return command;
 }
 

@@ -6,6 +6,7 @@
 #include "rig/cli/arguments.h"
 #include "rig/cli/choices.h"
 #include "rig/cli/commands.h"
+#include "rig/cli/object_options.h"
 
 namespace darkbox {
 namespace {
@@ -15,11 +16,13 @@ constexpr std::string_view warning_prefix = "warning: ";
 struct Arguments {
     ImportOptions options;
     std::vector<std::string> balls;
+    ObjectOptions object;
 };
 
 CommandResult run(const Arguments& arguments, const WorkContext& work) {
     ImportOptions options = arguments.options;
     for (const std::string& text : arguments.balls) options.balls.push_back(parse_ball(text));
+    options.record = object_record(arguments.object);
     const Session session = import_photographs(options, work);
 
     CommandResult result;
@@ -52,6 +55,7 @@ void add_import_command(CommandLine& line) {
         ->required();
     command.add_option("--out", a->options.out, "Folder of the new session")->required();
     command.add_option("--object", a->options.object, "Name of the object; default: the first folder's name");
+    add_object_options(command, a->object);
     command.add_option("--ball-images", a->options.ball_images, "Folder with a mirror ball under the same lamps");
     command.add_option("--ball", a->balls, "A ball's outline, pixels: X,Y,R; once for each ball");
     command.add_option("--ball-diameter", a->options.ball_diameter_mm, "Of the mirror balls, mm: tells the scale");

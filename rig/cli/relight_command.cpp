@@ -7,6 +7,7 @@
 #include "acquisition/frame/error.h"
 #include "processing/formats/environment_file.h"
 #include "processing/maps/srgb.h"
+#include "processing/pipeline/provenance.h"
 #include "processing/pipeline/stages.h"
 #include "processing/pipeline/steps.h"
 #include "rig/cli/arguments.h"
@@ -124,6 +125,7 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
     const PictureStyle style{viewing_gain(scene.albedo.albedo, scene.albedo.valid), a.bits};
     const Relighter relighter(scene, work);
     const Seconds seconds = write_pictures(names, plan, relighter, options, style, work);
+    describe_pictures(session, "relit", names, described(a.relight));
 
     const auto count = static_cast<double>(names.size());
     CommandResult result;

@@ -1,5 +1,8 @@
 #include "rig/cli/relight_options.h"
 
+#include <fmt/format.h>
+
+#include <filesystem>
 #include <numbers>
 
 #include "processing/pipeline/session_geometry.h"
@@ -7,6 +10,14 @@
 #include "rig/cli/choices.h"
 
 namespace darkbox {
+namespace {
+
+const std::map<std::string, ReflectanceModel> models{{"lambert", ReflectanceModel::lambert},
+                                                     {"phong", ReflectanceModel::phong},
+                                                     {"phong-split", ReflectanceModel::phong_split}};
+const std::map<std::string, Lookup> lookups{{"thesis", Lookup::thesis}, {"detail", Lookup::detail}};
+
+}  // namespace
 
 void add_relight_options(CLI::App& command, RelightArguments& a) {
     command.add_option("--light", a.lights, "Vector to a light, viewer frame: X,Y,Z or X,Y,Z:R,G,B; may be repeated")
@@ -23,14 +34,10 @@ void add_relight_options(CLI::App& command, RelightArguments& a) {
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     command.add_option("--yaw", a.yaw_deg, "Turns the environment about the upright axis, degrees")
         ->capture_default_str();
-    const std::map<std::string, ReflectanceModel> models{{"lambert", ReflectanceModel::lambert},
-                                                         {"phong", ReflectanceModel::phong},
-                                                         {"phong-split", ReflectanceModel::phong_split}};
     command
         .add_option("--model", a.options.model,
                     "lambert; phong: one coefficient, highlights of the texel's colour; phong-split: a coat of gloss")
         ->transform(one_of(models));
-    const std::map<std::string, Lookup> lookups{{"thesis", Lookup::thesis}, {"detail", Lookup::detail}};
     command
         .add_option("--lookup", a.options.lookup, "thesis: the texel's radiance; detail: scaled by the pixel's albedo")
         ->transform(one_of(lookups));
@@ -44,6 +51,20 @@ void add_relight_options(CLI::App& command, RelightArguments& a) {
     command.add_option("--exponent", a.options.phong_exponent, "Phong's exponent, 1 to 1000")->capture_default_str();
     command.add_option("--specular-colour", a.specular_colour, "Colour of phong-split's highlights: R,G,B, 0 to 1");
     command.add_option("--exposure", a.options.exposure, "Factor on the result")->capture_default_str();
+}
+
+std::vector<std::string> described(const RelightArguments& arguments) {
+    std::vector<std::string> parameters;
+    for (const auto& [name, model] : models)
+        if (model == arguments.options.model) parameters.push_back("relight.model=" + name);
+    for (const auto& [name, lookup] : lookups)
+        if (lookup == arguments.options.lookup) parameters.push_back("relight.lookup=" + name);
+    parameters.push_back(fmt::format("relight.exposure={}", arguments.options.exposure));
+    for (const std::string& light : arguments.lights) parameters.push_back("relight.light=" + light);
+    for (const std::string& place : arguments.lamp_positions) parameters.push_back("relight.light-position=" + place);
+    for (const std::string& file : arguments.environments)
+        parameters.push_back("relight.environment=" + std::filesystem::path(file).filename().string());
+    return parameters;
 }
 
 void require_readable_lights(const RelightArguments& arguments) {

@@ -30,6 +30,9 @@ void require_readable_lights(const RelightArguments& arguments);
 /// 0. `scene` has a view where there is a --light-position.
 Lights lights_of(const RelightArguments& arguments, const RelightScene& scene);
 
+/// As "model=phong", "light=0,0,1": for the pictures' provenance.
+std::vector<std::string> described(const RelightArguments& arguments);
+
 /// Options with degrees turned into radians and colours parsed, validated.
 RelightOptions relight_options(const RelightArguments& arguments);
 

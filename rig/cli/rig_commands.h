@@ -17,6 +17,9 @@ void add_rig_commands(CommandLine& line);
 /// `darkbox sessions`, `darkbox calibrations` and `darkbox jobs`.
 void add_catalog_commands(CommandLine& line);
 
+/// `darkbox sessions prune`, below the command `sessions`.
+void add_prune_command(CommandLine& line, CLI::App& sessions);
+
 /// `darkbox doctor`.
 void add_doctor_command(CommandLine& line);
 /// `darkbox ageing`.

@@ -15,6 +15,7 @@
 #include "processing/formats/picture.h"
 #include "processing/formats/png.h"
 #include "processing/maps/srgb.h"
+#include "processing/pipeline/provenance.h"
 #include "processing/pipeline/stages.h"
 #include "processing/transfer/transfer.h"
 #include "rig/cli/arguments.h"
@@ -143,6 +144,18 @@ std::vector<fs::path> write_relit_pictures(const Arguments& a, const RelightScen
     return written;
 }
 
+/// The colours are the source's, so the pictures say what is known of it.
+void describe_transferred(const Arguments& a, const std::vector<fs::path>& relit) {
+    const Session source = Session::open(a.source);
+    std::vector<std::string> parameters{fmt::format("transfer.target={}", a.target.filename().string()),
+                                        fmt::format("transfer.seed={}", a.options.seed)};
+    for (const auto& [name, method] : methods)
+        if (method == a.options.method) parameters.push_back("transfer.method=" + name);
+    describe_pictures(source, "texture moved onto another object", {a.out / "albedo.png"}, parameters);
+    for (std::string& parameter : described(a.relight)) parameters.push_back(std::move(parameter));
+    describe_pictures(source, "texture moved onto another object, relit", relit, parameters);
+}
+
 Json json_of(const std::optional<double>& figure) { return figure ? Json(*figure) : Json(); }
 
 CommandResult run(const Arguments& a, const WorkContext& work) {
@@ -179,6 +192,7 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
     if (relit_wanted)
         relit =
             write_relit_pictures(a, {moved.normals, moved.albedo, moved.index, *source.shading, target.geometry}, work);
+    if (!a.source.empty()) describe_transferred(a, relit);
 
     CommandResult result;
     result.json = {{"out", a.out.string()},

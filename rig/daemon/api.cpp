@@ -146,7 +146,7 @@ const std::vector<Api::Route>& Api::table() {
         {"GET", "jobs/{id}", {}, &Api::job},
         {"DELETE", "jobs/{id}", {}, &Api::cancel},
         {"GET", "jobs/{id}/log", {}, &Api::job_log},
-        {"GET", "sessions", {"after", "limit"}, &Api::sessions},
+        {"GET", "sessions", {"after", "find", "limit"}, &Api::sessions},
         {"GET", "sessions/{name}", {}, &Api::session},
         {"GET", "sessions/{name}/files", {}, &Api::files},
         {"GET", "sessions/{name}/files/{path}", {}, &Api::file},

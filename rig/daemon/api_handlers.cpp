@@ -34,6 +34,17 @@ PageRequest page_of(const std::map<std::string, std::string>& query) {
     return page;
 }
 
+/// The words to look for. Each is a condition of its own, so there are not many.
+std::string find_of(const std::map<std::string, std::string>& query) {
+    constexpr std::size_t longest = 200;  // bytes
+    const auto find = query.find("find");
+    if (find == query.end()) return "";
+    if (find->second.size() > longest)
+        throw InputError(fmt::format("find has {} bytes; allowed: up to {}", find->second.size(), longest),
+                         "look for fewer words");
+    return find->second;
+}
+
 /// One more than the page is asked for, to see whether it goes on.
 template <typename Items, typename Key>
 void end_page(Json& json, Items& items, std::size_t limit, Key key) {
@@ -81,7 +92,8 @@ ApiResponse Api::events(const Call& call) const {
 
 ApiResponse Api::start_capture(const Call& call) const {
     const Json body = need_json(call.request);
-    if (body.contains("process")) throw InputError("unknown key \"process\"", "known: object, lamps, name, resume");
+    if (body.contains("process"))
+        throw InputError("unknown key \"process\"", "known: object, inventory, dublin_core, lamps, mode, name, resume");
     return reply(to_json(service_.start_capture(capture_order_from(body))), 202);
 }
 
@@ -120,6 +132,8 @@ Json Api::describe(const SessionListing& session, const ServiceStatus& status) c
               {"state", capturing ? "capturing" : darkbox::name(session.state)},
               {"frames", session.frames}};
     if (!session.object.empty()) json["object"] = session.object;
+    if (!session.record.inventory.empty()) json["inventory"] = session.record.inventory;
+    if (!session.record.dublin_core.empty()) json["dublin_core"] = session.record.dublin_core;
     if (!session.created.empty()) json["created"] = session.created;
     if (!session.problem.empty()) json["problem"] = session.problem;
     if (!session.retakes.empty()) json["retakes"] = session.retakes;
@@ -131,9 +145,10 @@ ApiResponse Api::sessions(const Call& call) const {
     const std::size_t limit = page.limit++;
     const ServiceStatus status = service_.status();
     service_.catalog().refresh_if_changed();
-    auto sessions = service_.catalog().sessions(page);
+    const std::string find = find_of(call.query);
+    auto sessions = service_.catalog().sessions(page, find);
     Json json{{"folder", fs::absolute(service_.sessions()).string()},
-              {"total", service_.catalog().session_count()},
+              {"total", service_.catalog().session_count(find)},
               {"sessions", Json::array()}};
     end_page(json, sessions, limit, [](const SessionListing& session) { return session.name; });
     for (const SessionListing& session : sessions) json["sessions"].push_back(describe(session, status));

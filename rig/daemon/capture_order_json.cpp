@@ -13,7 +13,7 @@ using Json = nlohmann::json;
 
 constexpr std::size_t longest_text = 200;  ///< bytes
 constexpr std::size_t most_lamps = 1024;
-constexpr const char* known_kinds = "known: capture, recalibrate, calibrate, process, export";
+constexpr const char* known_kinds = "known: capture, recalibrate, calibrate, process, export, prune";
 
 std::string text(const Json& value, const std::string& key) {
     if (!value.is_string()) throw InputError(fmt::format("\"{}\" is not a string", key), "put it in quotes");
@@ -32,8 +32,8 @@ ExposureChoice exposure(const Json& value) {
     if (value.is_number() && value.get<double>() >= shortest_us && value.get<double>() <= longest_us)
         return {Seconds(value.get<double>() / 1e6)};
     if (value == "auto") return {std::nullopt};
-    throw InputError(fmt::format("\"exposure\" is {}", value.dump(-1, ' ', true, Json::error_handler_t::replace)
-                                                            .substr(0, longest_text)),
+    throw InputError(fmt::format("\"exposure\" is {}",
+                                 value.dump(-1, ' ', true, Json::error_handler_t::replace).substr(0, longest_text)),
                      R"(write "auto", or microseconds: 1 to 60000000)");
 }
 
@@ -44,6 +44,21 @@ std::vector<std::string> texts(const Json& value, const std::string& key) {
     std::vector<std::string> result;
     for (const Json& item : value) result.push_back(text(item, key));
     return result;
+}
+
+/// {"title": "A vase", "creator": ["A", "B"]}
+void add_dublin_core(const Json& value, ObjectRecord& record) {
+    const std::string where = "\"dublin_core\"";
+    if (!value.is_object()) throw InputError(where + " is not an object", R"(write {"title": "A vase"})");
+    for (const auto& [element, values] : value.items()) {
+        for (const Json& one : values.is_array() ? values : Json::array({values})) {
+            if (!one.is_string())
+                throw InputError(where + " holds something that is neither a string nor a list of them",
+                                 R"(write {"creator": ["A", "B"]})");
+            add_value(where, record, element, one.get<std::string>());
+        }
+    }
+    require_valid(where, record);
 }
 
 }  // namespace
@@ -70,6 +85,10 @@ CaptureOrder capture_order_from(const Json& json) {
             order.exposure = exposure(value);
         } else if (key == "lamps") {
             order.lamps = texts(value, key);
+        } else if (key == "inventory") {
+            order.record.inventory = text(value, key);
+        } else if (key == "dublin_core") {
+            add_dublin_core(value, order.record);
         } else if (key == "mode") {
             order.mode = sync_mode_from_name(text(value, key));
             if (!order.mode)
@@ -77,7 +96,7 @@ CaptureOrder capture_order_from(const Json& json) {
                                  "known: settled, predictive, strobed");
         } else if (key != "process") {  // what is to follow is the queue's concern
             throw InputError(fmt::format("unknown key \"{}\"", key.substr(0, longest_text)),
-                             "known: object, lamps, mode, exposure, name, retake, resume");
+                             "known: object, inventory, dublin_core, lamps, mode, exposure, name, retake, resume");
         }
     }
     return order;
@@ -96,6 +115,13 @@ Job job_from(const Json& body) {
         if (const auto process = body.find("process"); process != body.end() && !process->is_boolean())
             throw InputError("\"process\" is not true or false", "leave it out, or write true");
         (void)capture_order_from(job.orders);
+        return job;
+    }
+    if (job.kind == JobKind::prune) {
+        for (const auto& [key, value] : job.orders.items())
+            if (key != "dry_run" || !value.is_boolean())
+                throw InputError(fmt::format("unknown key \"{}\"", key.substr(0, longest_text)),
+                                 "known: kind, and dry_run: true or false");
         return job;
     }
     for (const auto& [key, value] : job.orders.items()) {
@@ -128,6 +154,8 @@ Json to_json(const CaptureOrder& order) {
     if (!order.object.empty()) json["object"] = order.object;
     if (!order.name.empty()) json["name"] = order.name;
     if (!order.lamps.empty()) json["lamps"] = order.lamps;
+    if (!order.record.inventory.empty()) json["inventory"] = order.record.inventory;
+    if (!order.record.dublin_core.empty()) json["dublin_core"] = order.record.dublin_core;
     if (order.mode) json["mode"] = name(*order.mode);
     if (order.exposure) {
         const auto& fixed = order.exposure->fixed;

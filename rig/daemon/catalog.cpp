@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
 #include <tuple>
 
 #include "acquisition/device/device_error.h"
@@ -18,12 +21,42 @@ namespace {
 namespace fs = std::filesystem;
 using SQLite::Statement;
 
-constexpr const char* session_columns = "name, state, object, created, frames, problem, retakes";
+constexpr const char* session_columns =
+    "name, state, object, created, frames, problem, retakes, inventory, dublin_core";
+
+std::string lower_case(std::string text) {
+    for (char& c : text)
+        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    return text;
+}
+
+/// Everything that a search looks through.
+std::string words_of(const SessionListing& session) {
+    std::string words = session.name + '\n' + session.object + '\n' + session.record.inventory;
+    for (const auto& entry : session.record.dublin_core)
+        for (const std::string& value : entry.second) words += '\n' + value;
+    return lower_case(std::move(words));
+}
+
+/// What is asked for, word by word.
+std::vector<std::string> wanted_words(const std::string& find) {
+    std::istringstream text(lower_case(find));
+    return {std::istream_iterator<std::string>(text), {}};
+}
+
+/// The condition that each of them occurs.
+std::string having(const std::vector<std::string>& words) {
+    std::string condition;
+    for (std::size_t i = 0; i < words.size(); ++i) condition += " AND instr(words, ?) > 0";
+    return condition;
+}
 
 SessionListing read_listing(Statement& row) {
+    const auto dublin_core = nlohmann::json::parse(row.getColumn(8).getString()).get<DublinCore>();
     return {.name = row.getColumn(0).getString(),
             .state = session_state_from_name(row.getColumn(1).getString()),
             .object = row.getColumn(2).getString(),
+            .record = {.inventory = row.getColumn(7).getString(), .dublin_core = dublin_core},
             .created = row.getColumn(3).getString(),
             .frames = static_cast<std::size_t>(row.getColumn(4).getInt64()),
             .problem = row.getColumn(5).getString(),
@@ -110,8 +143,9 @@ void put_calibration(SQLite::Database& database, const CatalogCalibration& c) {
 
 void insert_session(SQLite::Database& database, const ScannedSession& scanned, const std::string& stamp) {
     const SessionListing& s = scanned.listing;
-    Statement insert(database, "INSERT INTO sessions VALUES (?, ?, ?, ?, ?, ?, ?, ?)");
-    bind_all(insert, s.name, name(s.state), s.object, s.created, whole(s.frames), s.problem, stamp, s.retakes);
+    Statement insert(database, "INSERT INTO sessions VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
+    bind_all(insert, s.name, name(s.state), s.object, s.created, whole(s.frames), s.problem, stamp, s.retakes,
+             s.record.inventory, nlohmann::json(s.record.dublin_core).dump(), words_of(s));
     insert.exec();
     insert_frames(database, scanned);
     if (scanned.calibration) put_calibration(database, *scanned.calibration);
@@ -144,7 +178,8 @@ void compare_again(SQLite::Database& database, const fs::path& folder, const Ear
             database, "SELECT * FROM calibrations WHERE rig = ? ORDER BY created, session", read_calibration_row, rig);
         for (std::size_t i = 0; i < all.size(); ++i) {
             if (all[i].created < created) continue;
-            rows_of<int>(database, "DELETE FROM drift WHERE session = ?", [](Statement&) { return 0; }, all[i].session);
+            rows_of<int>(
+                database, "DELETE FROM drift WHERE session = ?", [](Statement&) { return 0; }, all[i].session);
             if (i == 0) continue;
             put_drift(database, compare_calibrations(folder, all[i - 1].session, all[i].session, "last"));
             put_drift(database, compare_calibrations(folder, all[0].session, all[i].session, "first"));
@@ -283,11 +318,18 @@ void Catalog::rebuild() {
     });
 }
 
-std::vector<SessionListing> Catalog::sessions(const PageRequest& page) const {
+std::vector<SessionListing> Catalog::sessions(const PageRequest& page, const std::string& find) const {
+    const std::vector<std::string> words = wanted_words(find);
     return with_database(*state_, [&](SQLite::Database& database) {
-        return rows_of<SessionListing>(
-            database, fmt::format("SELECT {} FROM sessions WHERE name > ? ORDER BY name LIMIT ?", session_columns),
-            read_listing, page.after, whole(page.limit));
+        Statement statement(database, fmt::format("SELECT {} FROM sessions WHERE name > ?{} ORDER BY name LIMIT ?",
+                                                  session_columns, having(words)));
+        int place = 0;
+        statement.bind(++place, page.after);
+        for (const std::string& word : words) statement.bind(++place, word);
+        statement.bind(++place, whole(page.limit));
+        std::vector<SessionListing> rows;
+        while (statement.executeStep()) rows.push_back(read_listing(statement));
+        return rows;
     });
 }
 
@@ -300,9 +342,14 @@ std::optional<SessionListing> Catalog::session(const std::string& name) const {
     });
 }
 
-std::size_t Catalog::session_count() const {
-    return with_database(*state_, [](SQLite::Database& database) {
-        return static_cast<std::size_t>(database.execAndGet("SELECT count(*) FROM sessions").getInt64());
+std::size_t Catalog::session_count(const std::string& find) const {
+    const std::vector<std::string> words = wanted_words(find);
+    return with_database(*state_, [&](SQLite::Database& database) {
+        Statement statement(database, "SELECT count(*) FROM sessions WHERE 1" + having(words));
+        int place = 0;
+        for (const std::string& word : words) statement.bind(++place, word);
+        statement.executeStep();
+        return static_cast<std::size_t>(statement.getColumn(0).getInt64());
     });
 }
 

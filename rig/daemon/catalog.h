@@ -79,10 +79,11 @@ public:
     /// Forgets everything but the jobs and reads all sessions again.
     void rebuild();
 
-    /// By name.
-    std::vector<SessionListing> sessions(const PageRequest& page) const;
+    /// By name. `find`: only those that have all of these words in their name, object, inventory number or Dublin Core;
+    /// upper and lower case are the same for letters of ASCII.
+    std::vector<SessionListing> sessions(const PageRequest& page, const std::string& find = {}) const;
     std::optional<SessionListing> session(const std::string& name) const;
-    std::size_t session_count() const;
+    std::size_t session_count(const std::string& find = {}) const;
     std::vector<CatalogFrame> frames(const std::string& session) const;
 
     /// Oldest first.

@@ -48,6 +48,13 @@ CREATE TABLE drift (
     R"sql(
 DELETE FROM sessions;
 ALTER TABLE sessions ADD COLUMN retakes TEXT NOT NULL DEFAULT '';
+)sql",
+    // Every session is read again for them.
+    R"sql(
+ALTER TABLE sessions ADD COLUMN inventory TEXT NOT NULL DEFAULT '';
+ALTER TABLE sessions ADD COLUMN dublin_core TEXT NOT NULL DEFAULT '{}';
+ALTER TABLE sessions ADD COLUMN words TEXT NOT NULL DEFAULT '';
+UPDATE sessions SET stamp = '';
 )sql"};
 static_assert(migrations.size() == catalog_version);
 

@@ -24,7 +24,7 @@ struct Catalog::State {
 };
 
 /// The version of the tables that this program writes; PRAGMA user_version in the file.
-inline constexpr int catalog_version = 3;
+inline constexpr int catalog_version = 4;
 
 /// Sets the connection up for a daemon that may be killed, and brings older tables up to catalog_version, one
 /// transaction a version. Throws InputError for a newer file.

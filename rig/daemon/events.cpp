@@ -3,6 +3,7 @@
 namespace darkbox {
 
 void EventLog::publish(const std::string& type, nlohmann::json fields) {
+    if (also_) also_(type, fields);
     {
         const std::scoped_lock lock(mutex_);
         fields["event"] = type;

@@ -24,6 +24,11 @@ class EventLog {
 public:
     explicit EventLog(std::size_t capacity = 1024) : capacity_(capacity) {}
 
+    /// `also` hears of every event as it is published, on the thread that does. Set once, before any.
+    void tee(std::function<void(const std::string& type, const nlohmann::json& fields)> also) {
+        also_ = std::move(also);
+    }
+
     /// Types: "state", "progress", "done", "cancelled", "failed", "lamps".
     void publish(const std::string& type, nlohmann::json fields);
     std::vector<Event> after(std::uint64_t number) const;
@@ -45,6 +50,7 @@ private:
     std::deque<Event> events_;  // guarded by mutex_
     std::uint64_t last_ = 0;    // guarded by mutex_
     bool closed_ = false;       // guarded by mutex_
+    std::function<void(const std::string&, const nlohmann::json&)> also_;
     mutable std::mutex notify_mutex_;
     std::function<void()> notify_;  // guarded by notify_mutex_
 };

@@ -6,9 +6,9 @@
 namespace darkbox {
 namespace {
 
-constexpr std::array kinds{std::pair{JobKind::capture, "capture"}, std::pair{JobKind::recalibrate, "recalibrate"},
+constexpr std::array kinds{std::pair{JobKind::capture, "capture"},     std::pair{JobKind::recalibrate, "recalibrate"},
                            std::pair{JobKind::calibrate, "calibrate"}, std::pair{JobKind::process, "process"},
-                           std::pair{JobKind::export_map, "export"}};
+                           std::pair{JobKind::export_map, "export"},   std::pair{JobKind::prune, "prune"}};
 constexpr std::array states{std::pair{JobState::queued, "queued"}, std::pair{JobState::running, "running"},
                             std::pair{JobState::done, "done"}, std::pair{JobState::cancelled, "cancelled"},
                             std::pair{JobState::failed, "failed"}};

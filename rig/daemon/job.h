@@ -15,12 +15,13 @@ namespace darkbox {
 /// What a listener asks the service to capture. Exactly one of a new session and one to resume.
 struct CaptureOrder {
     std::string object = {};
-    std::vector<std::string> lamps = {};     ///< names; empty = all
-    std::optional<SyncMode> mode = {};       ///< none: the one of rig.toml
+    std::vector<std::string> lamps = {};          ///< names; empty = all
+    std::optional<SyncMode> mode = {};            ///< none: the one of rig.toml
     std::optional<ExposureChoice> exposure = {};  ///< none: as rig.toml says
-    std::optional<std::string> retake = {};  ///< name of a sealed session whose `lamps` are to be taken again
-    std::string name = {};                   ///< of the session; empty = made from object and date
-    std::optional<std::string> resume = {};  ///< name of an interrupted session
+    std::optional<std::string> retake = {};       ///< name of a sealed session whose `lamps` are to be taken again
+    std::string name = {};                        ///< of the session; empty = made from object and date
+    std::optional<std::string> resume = {};       ///< name of an interrupted session
+    ObjectRecord record = {};                     ///< of the object
 };
 
 enum class JobKind {
@@ -29,6 +30,7 @@ enum class JobKind {
     calibrate,
     process,     ///< all stages, then the report
     export_map,  ///< into another program's format
+    prune,       ///< removes sessions by the rules of [retention]; has no session of its own
 };
 std::string_view name(JobKind kind);
 std::optional<JobKind> job_kind_from_name(std::string_view name);

@@ -118,6 +118,16 @@ std::size_t JobBook::unfinished(Lane lane) const {
         std::ranges::count_if(live_, [lane](const auto& entry) { return lane_of(entry.second.job.kind) == lane; }));
 }
 
+std::vector<std::string> JobBook::sessions_in_use() const {
+    const std::scoped_lock lock(mutex_);
+    std::vector<std::string> names;
+    for (const auto& entry : live_)
+        for (const std::string& name :
+             {entry.second.job.session, entry.second.job.orders.value("resume", std::string())})
+            if (!name.empty()) names.push_back(name);
+    return names;
+}
+
 JobCounts JobBook::counts() const {
     const std::scoped_lock lock(mutex_);
     return counts_;

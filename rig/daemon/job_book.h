@@ -49,6 +49,8 @@ public:
     Job find(std::uint64_t id) const;
     std::vector<Job> list(const PageRequest& page) const;
     std::size_t unfinished(Lane lane) const;
+    /// Of queued and running jobs.
+    std::vector<std::string> sessions_in_use() const;
     /// Of those that ended since the book was opened.
     JobCounts counts() const;
 

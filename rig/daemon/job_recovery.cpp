@@ -43,7 +43,7 @@ Job resumed(Job job, const fs::path& sessions) {
     job.orders.erase("resume");
     job.orders.erase("name");
     if (began) {
-        for (const char* key : {"object", "lamps"}) job.orders.erase(key);
+        for (const char* key : {"object", "inventory", "dublin_core", "lamps"}) job.orders.erase(key);
         job.orders["resume"] = job.session;
     } else {
         job.orders["name"] = job.session;

@@ -4,12 +4,12 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <csignal>
-#include <cstdio>
 #include <filesystem>
 #include <optional>
 
 #include "acquisition/frame/error.h"
 #include "rig/daemon/api.h"
+#include "rig/daemon/attempt.h"
 #include "rig/daemon/client.h"
 #include "rig/daemon/hardware.h"
 #include "rig/daemon/http_server.h"
@@ -17,6 +17,7 @@
 #include "rig/daemon/processing_command.h"
 #include "rig/daemon/service.h"
 #include "rig/daemon/session_folder.h"
+#include "rig/daemon/structured_log.h"
 
 namespace darkbox {
 namespace {
@@ -30,6 +31,7 @@ struct DaemonOptions {
     fs::path socket;
     fs::path sessions;
     std::string listen;
+    std::string log_level = "info";
 };
 
 RigDescription load(const DaemonOptions& options) {
@@ -43,9 +45,6 @@ fs::path first_given(const fs::path& option, const fs::path& configured, fs::pat
     if (!option.empty()) return option;
     return configured.empty() ? otherwise() : configured;
 }
-
-/// Never throws, unlike fmt::print: stderr may be closed.
-void put(const std::string& text) { std::fputs(text.c_str(), stderr); }
 
 PeerAccess peers_of(const std::string& group) {
     if (group.empty()) return {};
@@ -68,7 +67,8 @@ std::uint64_t capture_bytes(const RigDescription& rig, const CaptureOrder& order
     const std::size_t lamps = order.lamps.empty() ? rig.lamps.size() : order.lamps.size();
     const auto brackets = static_cast<std::uint64_t>(rig.capture.brackets.size());
     const auto lit = lamps * static_cast<std::uint64_t>(rig.capture.averages);
-    const std::uint64_t between = rig.capture.dark_every > 0 ? lit / static_cast<std::uint64_t>(rig.capture.dark_every) : 0;
+    const std::uint64_t between =
+        rig.capture.dark_every > 0 ? lit / static_cast<std::uint64_t>(rig.capture.dark_every) : 0;
     return brackets * (lit + between + 2) * pixels * planes * 2 + papers;
 }
 
@@ -92,21 +92,27 @@ TcpListen listen_from(const std::string& text, const fs::path& token_file) {
 /// Everything the daemon is, wired together.
 class Daemon {
 public:
-    Daemon(RigDescription rig, const HttpServerOptions& http, const fs::path& sessions)
+    Daemon(RigDescription rig, const HttpServerOptions& http, const fs::path& sessions, const LogSink& log)
         : rig_(std::move(rig)),
           hardware_(rig_),
           signals_(io_, SIGINT, SIGTERM, SIGHUP),
           watchdog_(io_),
           leave_(io_),
-          server_(io_, http, [this](const ApiRequest& request) { return api_->answer(request); }, log_, metrics_) {
+          pruning_(io_),
+          server_(
+              io_, http, [this](const ApiRequest& request) { return api_->answer(request); }, log_, metrics_) {
         fs::create_directories(sessions);
         ServiceOptions options{.sessions = sessions};
         options.bytes_needed = [this](const CaptureOrder& order) { return capture_bytes(rig_, order); };
         options.run_processing = processing_by(darkbox_beside_this_program());
+        options.retention = rig_.retention;
+        options.log = log;
+        log_.tee([log](const std::string& event, const nlohmann::json& fields) { log(log_line_of(event, fields)); });
         service_.emplace([this] { return hardware_.open(); }, options, log_);
         api_.emplace(rig_, *service_, metrics_);
         await_signal();
         feed_watchdog();
+        if (rig_.retention) prune_in(first_pruning);
     }
 
     Daemon(const Daemon&) = delete;
@@ -132,6 +138,7 @@ private:
             service_->request_stop();
             server_.stop();
             watchdog_.cancel();
+            pruning_.cancel();
             stopping_ = true;
             signals_.async_wait([this](const boost::system::error_code& cancelled, int) {
                 if (!cancelled) io_.stop();
@@ -159,6 +166,20 @@ private:
         });
     }
 
+    /// By [retention]; what keeps one from being queued keeps it only until the next.
+    void prune_in(std::chrono::minutes wait) {
+        pruning_.expires_after(wait);
+        pruning_.async_wait([this](const boost::system::error_code& error) {
+            if (error || stopping_) return;
+            if (const auto failure = attempt([this] { service_->enqueue({.kind = JobKind::prune}); }))
+                log_.publish("problem", {{"detail", failure->what}, {"hint", failure->hint}});
+            prune_in(every_pruning);
+        });
+    }
+
+    static constexpr std::chrono::minutes first_pruning{10};
+    static constexpr std::chrono::minutes every_pruning{24 * 60};
+
     const RigDescription rig_;
     Hardware hardware_;  // forks: before whatever starts a thread
     EventLog log_;
@@ -166,6 +187,7 @@ private:
     asio::signal_set signals_;
     asio::steady_timer watchdog_;
     asio::steady_timer leave_;
+    asio::steady_timer pruning_;
     bool stopping_ = false;
     Metrics metrics_;
     HttpServer server_;
@@ -174,6 +196,7 @@ private:
 };
 
 int run(const DaemonOptions& options) {
+    const LogSink log = log_sink(log_level_from_name(options.log_level));
     RigDescription rig = load(options);
     const fs::path socket = first_given(options.socket, rig.socket, default_socket);
     const fs::path sessions = first_given(options.sessions, rig.sessions_folder, default_sessions_folder);
@@ -183,22 +206,28 @@ int run(const DaemonOptions& options) {
     const std::string listen = options.listen.empty() ? rig.listen : options.listen;
     const fs::path token_file =
         rig.token_file.empty() ? fs::absolute(socket).parent_path() / "darkbox.token" : rig.token_file;
-    put(fmt::format("darkboxd: rig {}, {} lamps, socket {}, sessions {}\n", rig.name, rig.lamps.size(), socket.string(),
-                    sessions.string()));
+    log({LogLevel::info,
+         "darkboxd " DARKBOX_VERSION " starts",
+         {{"rig", rig.name},
+          {"lamps", std::to_string(rig.lamps.size())},
+          {"socket", socket.string()},
+          {"sessions", sessions.string()}}});
     if (!listen.empty()) http.tcp = listen_from(listen, token_file);
     const auto not_dark = [&] {
-        Daemon daemon(std::move(rig), http, sessions);
+        Daemon daemon(std::move(rig), http, sessions, log);
         if (http.tcp)
-            put(fmt::format("darkboxd: http://{}:{}, token in {}\n", http.tcp->address, daemon.port(),
-                            token_file.string()));
+            log({LogLevel::info,
+                 "listening",
+                 {{"address", fmt::format("http://{}:{}", http.tcp->address, daemon.port())},
+                  {"token_file", token_file.string()}}});
         daemon.run();
         return daemon.stop();
     }();
     if (not_dark) {
-        put(fmt::format("darkboxd: error: stopped, but the lamps could not be proven dark: {}\n", *not_dark));
+        log({LogLevel::error, "stopped, but the lamps could not be proven dark", {{"detail", *not_dark}}});
         return 1;
     }
-    put("darkboxd: stopped, lamps dark\n");
+    log({LogLevel::info, "stopped, lamps dark"});
     return 0;
 }
 
@@ -215,6 +244,7 @@ int parse_and_run(int argc, char** argv) {
                    "The folder of the sessions; else [api] sessions, $DARKBOX_SESSIONS, ./sessions");
     app.add_option("--listen", options.listen,
                    "Listen on this loopback address, too (127.0.0.1:7640), for who has the token; else [api] listen");
+    app.add_option("--log-level", options.log_level, "error, warning, notice, info (default) or debug");
     app.footer("Example:\n  darkboxd --simulate --lamps 12 --socket /tmp/darkbox.sock --sessions ./sessions");
     try {
         app.parse(argc, argv);
@@ -232,9 +262,9 @@ int main(int argc, char** argv) {
     try {
         return darkbox::parse_and_run(argc, argv);
     } catch (const darkbox::Error& error) {
-        darkbox::put(fmt::format("darkboxd: error: {}\n  {}\n", error.what(), error.hint()));
+        darkbox::log_sink(darkbox::LogLevel::error)({darkbox::LogLevel::error, error.what(), {{"hint", error.hint()}}});
     } catch (const std::exception& error) {
-        darkbox::put(fmt::format("darkboxd: error: {}\n", error.what()));
+        darkbox::log_sink(darkbox::LogLevel::error)({darkbox::LogLevel::error, error.what()});
     }
     return 1;
 }

@@ -168,7 +168,26 @@ Json result_of(int status, const std::string& out, const std::string& what, bool
 
 }  // namespace
 
+namespace {
+
+/// `folder` holds the sessions.
+std::vector<std::string> pruning_arguments(const Job& job, const fs::path& folder) {
+    std::vector<std::string> arguments{"sessions",         "prune",       "--folder", folder.string(), "--json",
+                                       "--progress-lines", "--for-daemon"};
+    for (const auto& [key, option] : {std::pair{"keep_days", "--keep-days"}, std::pair{"keep_newest", "--keep-newest"},
+                                      std::pair{"free_gb", "--free-gb"}})
+        if (const auto found = job.orders.find(key); found != job.orders.end())
+            arguments.insert(arguments.end(), {option, found->dump()});
+    if (job.orders.value("dry_run", false)) arguments.emplace_back("--dry-run");
+    for (const auto& name : job.orders.value("keep", std::vector<std::string>()))
+        arguments.insert(arguments.end(), {"--keep", name});
+    return arguments;
+}
+
+}  // namespace
+
 std::vector<std::string> processing_arguments(const Job& job, const fs::path& session) {
+    if (job.kind == JobKind::prune) return pruning_arguments(job, session);
     std::vector<std::string> arguments{std::string(name(job.kind)), session.string(), "--json", "--progress-lines"};
     if (job.kind != JobKind::export_map) return arguments;
     const std::string format = job.orders.value("format", "");

@@ -33,6 +33,8 @@ void ProcessingLane::perform(Job job, const std::stop_token& stop) {
     work.stop = book_.stop_token(job.id);
     work.report = [&](const ProgressUpdate& update) { book_.progress(job.id, update); };
     const auto failure = attempt([&] {
+        // What other jobs wait for is known only now.
+        if (job.kind == JobKind::prune) job.orders["keep"] = book_.sessions_in_use();
         job.result = run_(job, catalog_.folder() / job.session, work,
                           [&](const std::string& line) { book_.note(job.id, line); });
     });
@@ -40,7 +42,7 @@ void ProcessingLane::perform(Job job, const std::stop_token& stop) {
         (void)attempt([&] { book_.put_back(job.id); });  // else a restart finds it cut off, and queues it as well
         return;
     }
-    (void)attempt([&] { catalog_.refresh(job.session); });
+    (void)attempt([&] { job.session.empty() ? catalog_.refresh() : catalog_.refresh(job.session); });
     job.state = !failure ? JobState::done : failure->cancelled ? JobState::cancelled : JobState::failed;
     if (failure) job.failure = *failure;
     book_.finish(std::move(job));

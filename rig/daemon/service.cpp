@@ -39,6 +39,13 @@ std::string state_hint(ServiceState state, const std::string& problem) {
     return problem + "; check the lamps, then darkbox lamps dark";
 }
 
+/// A job keeps the rules it was asked for under.
+void add_rules(const RetentionRules& rules, nlohmann::json& orders) {
+    orders["keep_days"] = rules.keep_days;
+    orders["keep_newest"] = rules.keep_newest;
+    if (rules.free_gb) orders["free_gb"] = *rules.free_gb;
+}
+
 [[noreturn]] void refuse(ServiceState state, const std::string& problem) {
     throw Refused(fmt::format("the rig is {}", name(state)), state_hint(state, problem));
 }
@@ -91,20 +98,23 @@ ServiceStatus Service::status() const {
 
 CaptureRequest Service::request_for(const CaptureOrder& order, int attempt) const {
     const bool resumes = order.resume.has_value();
-    if (resumes && (!order.name.empty() || !order.object.empty() || order.retake || order.exposure))
+    if (resumes &&
+        !(order.name.empty() && order.object.empty() && order.record.empty() && !order.retake && !order.exposure))
         throw InputError("a resumed session keeps its name, object and plan", "give either \"resume\" or the others");
     if (order.retake && order.exposure)
         throw InputError("a re-take keeps its session's exposure", "leave out \"exposure\"");
     const std::string session =
-        resumes              ? *order.resume
-        : order.name.empty() ? fresh_session_name(options_.sessions, order.object.empty() ? order.retake.value_or("") : order.object,
-                                                  std::chrono::system_clock::now())
-                             : order.name;
+        resumes ? *order.resume
+        : order.name.empty()
+            ? fresh_session_name(options_.sessions, order.object.empty() ? order.retake.value_or("") : order.object,
+                                 std::chrono::system_clock::now())
+            : order.name;
     CaptureRequest request{.folder = session_path(options_.sessions, session),
                            .object = order.object,
                            .lamps = order.lamps,
                            .start = resumes ? CaptureStart::resume : CaptureStart::create,
                            .mode = order.mode};
+    request.record = order.record;
     request.exposure = order.exposure;
     if (order.retake) {
         request.retake = session_path(options_.sessions, *order.retake);
@@ -164,6 +174,10 @@ Job Service::enqueue(Job job) {
         (void)request_for(capture_order_from(job.orders), 1);
     } else if (!options_.run_processing) {
         throw Refused("this darkboxd does not process", "process with the command: darkbox process SESSION");
+    } else if (job.kind == JobKind::prune) {
+        if (!options_.retention)
+            throw Refused("rig.toml has no [retention], so sessions are never removed", "add one with keep_days = 90");
+        add_rules(*options_.retention, job.orders);
     } else if (!is_sealed(session_path(options_.sessions, job.session))) {
         throw NotFound(fmt::format("there is no sealed session \"{}\"", job.session), "darkbox sessions lists them");
     }
@@ -244,15 +258,34 @@ std::optional<Job> Service::take_queued() {
     return job;
 }
 
+/// For the log, and the job's own.
+CaptureListener Service::listener_for(const Job& job) {
+    const LogFields whose{{"job", std::to_string(job.id)}, {"session", job.session}};
+    return {.frame =
+                [this, whose](const FrameRecord& record) {
+                    LogFields fields = whose;
+                    if (record.lamp) fields.emplace_back("lamp", record.lamp_name);
+                    fields.emplace_back("frame", std::filesystem::path(record.file).stem().string());
+                    fields.emplace_back("sequence", std::to_string(record.sequence));
+                    options_.log({LogLevel::info, "frame taken", std::move(fields)});
+                },
+            .event =
+                [this, whose, id = job.id](const std::string& what) {
+                    options_.log({LogLevel::notice, what, whose});
+                    book_.note(id, what);
+                }};
+}
+
 void Service::capture(Job& job, const WorkContext& work) {
     if (work.cancelled()) throw Cancelled("the capture was cancelled before it began", "");
     CaptureOrder order = capture_order_from(job.orders);
     if (!order.resume && !job.session.empty()) order.name = job.session;
     // A session of its own that start_capture() has just named is not there yet; after a crash it may be.
-    const CaptureRequest request = request_for(order, job.attempts);
+    CaptureRequest request = request_for(order, job.attempts);
     job.session = request.folder.filename().string();
     require_room(order);
     book_.set_session(job.id, job.session);
+    request.listener = listener_for(job);
     job.outcome = rig_->capture(request, work);
     frames_captured_ += job.outcome.frames;
     exposures_repeated_ += static_cast<std::uint64_t>(job.outcome.repeated);

@@ -23,6 +23,7 @@
 #include "rig/daemon/job.h"
 #include "rig/daemon/job_book.h"
 #include "rig/daemon/processing_lane.h"
+#include "rig/daemon/structured_log.h"
 
 namespace darkbox {
 
@@ -54,6 +55,8 @@ struct ServiceOptions {
     std::function<std::uint64_t(const CaptureOrder&)> bytes_needed = {};
     std::uint64_t bytes_kept_free = 256ULL << 20;  ///< on the sessions' disk, beyond what a capture needs
     RunProcessing run_processing = {};             ///< empty: there is none, and such jobs are refused
+    std::optional<RetentionRules> retention = {};  ///< none: prune jobs are refused
+    LogSink log = [](const LogLine&) {};           ///< hears of frames and of what captures note
 };
 
 struct ServiceStatus {
@@ -123,6 +126,7 @@ private:
     void require_room(const CaptureOrder& order) const;
     void perform(const Job& job);
     void capture(Job& job, const WorkContext& work);
+    CaptureListener listener_for(const Job& job);
     void perform(Darken);
     std::optional<Failure> darken_lamps();
     void finish(Job job, const std::optional<Failure>& not_dark);

@@ -52,6 +52,7 @@ SessionListing describe_sealed(const fs::path& folder) {
     try {
         const Session session = Session::open(folder);
         listing.object = session.info().object;
+        listing.record = session.info().record;
         listing.created = session.info().created;
         listing.frames = session.frames().size();
         if (session.info().retakes) listing.retakes = session.info().retakes->name;
@@ -68,6 +69,7 @@ SessionListing describe_interrupted(const fs::path& folder) {
     try {
         const SessionInfo info = Journal::read_head(folder);
         listing.object = info.object;
+        listing.record = info.record;
         listing.created = info.created;
         if (info.retakes) listing.retakes = info.retakes->name;
         listing.frames = files_in(folder / "data" / "frames");
@@ -115,13 +117,6 @@ std::vector<std::string> session_names(const fs::path& folder) {
     }
     std::ranges::sort(names);
     return names;
-}
-
-std::vector<SessionListing> list_sessions(const fs::path& folder) {
-    std::vector<SessionListing> sessions;
-    for (const std::string& name : session_names(folder))
-        if (auto session = describe_session(folder / name)) sessions.push_back(std::move(*session));
-    return sessions;
 }
 
 fs::path session_path(const fs::path& folder, const std::string& name) {

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "acquisition/session/object_record.h"
+
 namespace darkbox {
 
 /// The folder that holds a rig's sessions, one folder each.
@@ -18,6 +20,7 @@ struct SessionListing {
     std::string name = {};  ///< of its folder
     State state = State::sealed;
     std::string object = {};
+    ObjectRecord record = {};
     std::string created = {};  ///< ISO 8601, UTC
     std::size_t frames = 0;
     std::string problem = {};  ///< of a damaged one, in words
@@ -33,9 +36,6 @@ std::vector<std::string> session_names(const std::filesystem::path& folder);
 
 /// No value when the folder is no session. Never throws for a damaged one.
 std::optional<SessionListing> describe_session(const std::filesystem::path& session);
-
-/// Sorted by name. Folders that are no sessions are left out; an absent folder holds none.
-std::vector<SessionListing> list_sessions(const std::filesystem::path& folder);
 
 /// The path of the session of this name. A name is 1 to 100 of A-Z a-z 0-9 . _ - and does not start with a dot, so it
 /// cannot leave the folder; anything else is an InputError.

@@ -348,6 +348,18 @@ void read_api(TomlSection& section, RigDescription& rig) {
     rig.token_file = section.text("token_file").value_or("");
 }
 
+RetentionRules read_retention(TomlSection& section) {
+    section.allow({"keep_days", "keep_newest", "free_gb"});
+    RetentionRules rules;
+    const auto days = section.integer("keep_days", {1, 36'500});
+    if (!days)
+        section.fail("keep_days", "has no keep_days", "say for how many days sessions stay at least: keep_days = 90");
+    rules.keep_days = static_cast<int>(*days);
+    rules.keep_newest = static_cast<int>(section.integer("keep_newest", {0, 1'000'000}).value_or(0));
+    rules.free_gb = section.number("free_gb", {0.001, 1e6});
+    return rules;
+}
+
 /// The simulator draws from where the description says that the camera is, and the description of a perspective scene
 /// tells the simulator's own place where it says nothing.
 void settle_simulated_camera(RigDescription& rig) {
@@ -357,7 +369,7 @@ void settle_simulated_camera(RigDescription& rig) {
 }
 
 RigDescription read_rig(TomlSection& root) {
-    root.allow({"rig", "camera", "lamps", "ball", "capture", "processing", "api", "sim"}, "section");
+    root.allow({"rig", "camera", "lamps", "ball", "capture", "processing", "api", "retention", "sim"}, "section");
     RigDescription rig;
     if (auto section = root.section("rig", "[rig]")) {
         section->allow({"name"});
@@ -374,6 +386,7 @@ RigDescription read_rig(TomlSection& root) {
     if (auto section = root.section("capture", "[capture]")) rig.capture = read_capture(*section);
     if (auto section = root.section("processing", "[processing]")) section->allow({});
     if (auto section = root.section("api", "[api]")) read_api(*section, rig);
+    if (auto section = root.section("retention", "[retention]")) rig.retention = read_retention(*section);
     if (auto section = root.section("sim", "[sim]")) rig.sim = read_sim(*section);
     settle_simulated_camera(rig);
     if (!lamps) root.fail("lamps", "has no [lamps]", "add [lamps] with a [[lamps.lamp]] for each lamp");

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "acquisition/frame/units.h"
+#include "rig/description/retention_rules.h"
 
 namespace darkbox {
 
@@ -70,15 +71,15 @@ std::optional<SyncMode> sync_mode_from_name(std::string_view name);
 
 struct CaptureDescription {
     SyncMode mode = SyncMode::settled;
-    bool metered = false;               ///< exposure = "metered": found before each capture; else exposure_ms of [camera]
-    bool ambient = false;               ///< the room's light is not kept out: frames without a lamp are of kind ambient
-    int dark_every = 0;                 ///< lit frames after which one without a lamp comes; 0: at both ends only
-    int averages = 1;                   ///< frames of every lamp at every exposure
+    bool metered = false;  ///< exposure = "metered": found before each capture; else exposure_ms of [camera]
+    bool ambient = false;  ///< the room's light is not kept out: frames without a lamp are of kind ambient
+    int dark_every = 0;    ///< lit frames after which one without a lamp comes; 0: at both ends only
+    int averages = 1;      ///< frames of every lamp at every exposure
     std::vector<double> brackets{1.0};  ///< exposures of every lamp, as multiples of the one exposure
-    Seconds frame_deadline{5.0};  ///< the longest wait for one frame
-    int tries = 3;                ///< per shot, before the session fails
-    double min_signal = 0.002;    ///< a lit frame's mean must exceed the dark frame's by this share of full scale
-    double max_dark = 0.01;       ///< a dark frame's mean may exceed the black level by this share of full scale
+    Seconds frame_deadline{5.0};        ///< the longest wait for one frame
+    int tries = 3;                      ///< per shot, before the session fails
+    double min_signal = 0.002;          ///< a lit frame's mean must exceed the dark frame's by this share of full scale
+    double max_dark = 0.01;             ///< a dark frame's mean may exceed the black level by this share of full scale
 };
 
 /// Options of the simulated rig; see sim/ for the scenes.
@@ -107,7 +108,7 @@ struct RigDescription {
     GpioDescription gpio;
     UsbDescription usb;
     std::vector<LampDescription> lamps;
-    bool distant_lamps = false;  ///< their light is parallel: behind collimators, or simulated so
+    bool distant_lamps = false;        ///< their light is parallel: behind collimators, or simulated so
     std::optional<double> flicker_hz;  ///< of the lamps' light (PWM, mains): exposures are whole numbers of its periods
     std::optional<double> ball_diameter_mm;
     CaptureDescription capture;
@@ -117,7 +118,8 @@ struct RigDescription {
     std::string socket_group;               ///< [api] group: whose members may use the socket; empty = only the owner
     std::string listen;                     ///< [api] listen: "127.0.0.1:7640"; empty = no TCP
     std::filesystem::path token_file;       ///< [api] token_file, for TCP; empty = beside the socket
-    std::string toml;                       ///< the text it came from, byte for byte
+    std::optional<RetentionRules> retention = {};  ///< none: sessions are never removed
+    std::string toml;                              ///< the text it came from, byte for byte
 };
 
 /// Strict: an unknown key or a wrong type is an InputError that names the line and the nearest known key; a value out

@@ -70,11 +70,37 @@ protected:
     TemporaryFolder folder_;
 };
 
+TEST_F(CatalogTest, FindsWords) {
+    for (const char* name : {"cup", "vase"}) {
+        SessionInfo info;
+        info.object = std::string("a ") + name;
+        info.created = "2026-01-01T00:00:00.000Z";
+        info.source = "import";
+        info.record.inventory = std::string("1907.") + name;
+        info.record.dublin_core["creator"] = {"A Potter", "100% _B_"};
+        SessionWriter::create(folder_.path() / name, info).seal();
+    }
+    Catalog catalog(folder_.path());
+    catalog.refresh();
+    const auto found = [&](const std::string& words) { return names(catalog.sessions({}, words)); };
+    EXPECT_THAT(found(""), ElementsAre("cup", "vase"));
+    EXPECT_THAT(found("potter"), ElementsAre("cup", "vase"));
+    EXPECT_THAT(found("POTTER  1907.Vase"), ElementsAre("vase"));
+    EXPECT_THAT(found("potter bowl"), IsEmpty());
+    EXPECT_THAT(found("100% _b_"), ElementsAre("cup", "vase"));  // nothing stands for anything else
+    EXPECT_THAT(found("1_07"), IsEmpty());
+    EXPECT_THAT(found("' OR 1=1 --"), IsEmpty());
+    EXPECT_EQ(catalog.session_count("vase"), 1U);
+    EXPECT_THAT(names(catalog.sessions({.after = "cup", .limit = 1}, "potter")), ElementsAre("vase"));
+    const auto vase = catalog.session("vase");
+    ASSERT_TRUE(vase);
+    EXPECT_EQ(vase->record.inventory, "1907.vase");
+    EXPECT_EQ(vase->record.dublin_core.at("creator"), (std::vector<std::string>{"A Potter", "100% _B_"}));
+}
+
 TEST_F(CatalogTest, KnowsWhatLiesOnDisk) {
     seal("cup");
-    {
-        const SessionWriter left = begin("vase", "2026-02-02T00:00:00.000Z");
-    }
+    { const SessionWriter left = begin("vase", "2026-02-02T00:00:00.000Z"); }
     fs::create_directory(folder_.path() / "torn");
     std::ofstream(folder_.path() / "torn" / "journal.jsonl") << "nonsense\n";
     fs::create_directory(folder_.path() / "no-session");
@@ -188,9 +214,7 @@ TEST_F(CatalogTest, IsTheSameOnceRebuilt) {
 
 TEST_F(CatalogTest, IsMadeAnewWhereItIsDamaged) {
     seal("cup");
-    {
-        Catalog(folder_.path()).refresh();
-    }
+    { Catalog(folder_.path()).refresh(); }
     const fs::path file = folder_.path() / ".darkbox" / "catalog.sqlite";
     for (const std::string& damage : {std::string(100, 'x'), std::string(200'000, '\xa5')}) {
         std::ofstream(file, std::ios::in | std::ios::out) << damage;
@@ -203,9 +227,7 @@ TEST_F(CatalogTest, IsMadeAnewWhereItIsDamaged) {
 }
 
 TEST_F(CatalogTest, RefusesOneOfANewerDarkbox) {
-    {
-        const Catalog made(folder_.path());
-    }
+    { const Catalog made(folder_.path()); }
     const std::string file = folder_.path() / ".darkbox" / "catalog.sqlite";
     SQLite::Database(file, SQLite::OPEN_READWRITE).exec("PRAGMA user_version = 99");
     EXPECT_THROW(Catalog(folder_.path()), InputError);

@@ -17,6 +17,7 @@ except ImportError:
 
 from api_client import Api
 
+RIG = pathlib.Path(__file__).resolve().parents[3] / "rig/description/examples/simulated-12-lamps.toml"
 METHODS = {"get", "put", "post", "delete", "options", "head", "patch", "trace"}
 
 
@@ -67,7 +68,8 @@ def drive_a_capture(api):
         time.sleep(0.05)
         status = api.call("getStatus").json()
     lamps = [lamp["name"] for lamp in api.call("listLamps").json()["lamps"]]
-    job = api.call("startCapture", {"object": "a vase", "lamps": lamps, "name": "vase"}).json()
+    job = api.call("startCapture", {"object": "a vase", "lamps": lamps, "name": "vase", "inventory": "1907.12",
+                                    "dublin_core": {"title": "Vase: Ø", "creator": ["A", "B"]}}).json()
     refused = api.call("startCapture", {"object": "another"})
     assert refused.status == 409 and "Busy" in refused.json()["detail"], refused.body
     previews = 0
@@ -93,6 +95,8 @@ def drive_a_capture(api):
     assert b"done" in log.body
     session = api.call("getSession", name="vase").json()
     assert session["state"] == "sealed" and len(session["frame_list"]) == len(lamps) + 2
+    assert session["inventory"] == "1907.12", session
+    assert session["dublin_core"] == {"title": ["Vase: Ø"], "creator": ["A", "B"]}, session
     assert {frame["lamp"] for frame in session["frame_list"] if frame["kind"] == "lit"} == set(lamps)
     return session
 
@@ -123,6 +127,8 @@ def work_the_queue(api):
     assert end_of(api, job)["event"] == "done"
     assert b"lamp" in api.call("getFile", name=done["session"], path="exports/lights.lp").body
     assert api.call("enqueueJob", {"kind": "process", "session": "absent"}).status == 404
+    pruned = end_of(api, api.call("enqueueJob", {"kind": "prune", "dry_run": True}).json())
+    assert pruned["event"] == "done" and pruned["result"]["kept"] == {"younger than 30 days": 2}, pruned
 
 
 def make_mistakes(api):
@@ -130,12 +136,19 @@ def make_mistakes(api):
     assert api.call("enqueueJob", {"kind": "export", "session": "vase"}, check_body=False).status == 400
     assert api.call("startCapture", {"objekt": "x"}, check_body=False).status == 400
     assert api.call("startCapture", {"name": "vase"}).status == 400
+    assert api.call("startCapture", {"dublin_core": {"titel": "x"}}, check_body=False).status == 400
+    assert api.call("startCapture", {"dublin_core": {"title": 1}}, check_body=False).status == 400
+    assert api.call("enqueueJob", {"kind": "prune", "session": "vase"}, check_body=False).status == 400
     assert api.call("startCapture", {"resume": "absent"}).status == 404
     assert api.call("getJob", id=999).status == 404
     assert api.call("getSession", name="absent").status == 404
     assert api.call("listSessions", limit=0).status == 400
     page = api.call("listSessions", limit=1).json()
     assert len(page["sessions"]) == 1 and page["next"] == page["sessions"][0]["name"]
+    found = api.call("listSessions", find="VASE%201907").json()
+    assert found["total"] == 1 and [s["name"] for s in found["sessions"]] == ["vase"], found
+    assert api.call("listSessions", find="vase%201908").json()["sessions"] == []
+    assert api.call("listSessions", find="x" * 201).status == 400
     assert "next" not in api.call("listSessions", after=page["next"], limit=1).json()
     assert len(api.call("listJobs", limit=2).json()["jobs"]) == 2
     assert api.call("rebuildCatalog").json()["sessions"] == 2
@@ -147,7 +160,9 @@ def main():
     daemon = sys.argv[1]
     with tempfile.TemporaryDirectory() as folder:
         path = str(pathlib.Path(folder) / "d.sock")
-        process = subprocess.Popen([daemon, "--simulate", "--lamps", "5", "--socket", path, "--sessions",
+        rig = pathlib.Path(folder) / "rig.toml"
+        rig.write_text(RIG.read_text() + "\n[retention]\nkeep_days = 30\n")
+        process = subprocess.Popen([daemon, "--config", str(rig), "--socket", path, "--sessions",
                                     str(pathlib.Path(folder) / "sessions")], stderr=subprocess.PIPE)
         try:
             while not pathlib.Path(path).exists():
