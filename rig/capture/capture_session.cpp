@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <span>
 #include <sstream>
 
 #include "acquisition/frame/error.h"
+#include "rig/capture/dosed_lamps.h"
+#include "rig/capture/light_dose.h"
 #include "rig/capture/session_recorder.h"
 
 namespace darkbox {
@@ -83,6 +86,36 @@ Begun resume(const CaptureRequest& request, const RigDescription& rig) {
     return {std::move(writer), std::move(plan)};
 }
 
+/// The plan's lamps whose frames are not there yet.
+std::vector<LampId> lamps_to_come(const Begun& begun) {
+    std::vector<LampId> lamps;
+    for (const Shot& shot : begun.plan.shots) {
+        const auto& records = begun.writer.acknowledged();
+        const bool there = std::any_of(records.begin(), records.end(), [&](const FrameRecord& record) {
+            return fs::path(record.file).stem() == shot.name;
+        });
+        if (shot.lamp && !there) lamps.push_back(*shot.lamp);
+    }
+    return lamps;
+}
+
+/// Takes the shots, and counts the light they cost the object where the lamps tell what they give. Nothing is lit when
+/// the budget cannot bear the shots that are to come.
+CaptureSummary take_shots(Begun& begun, const RigDescription& rig, const CaptureDevices& devices, FrameSink& sink,
+                          const WorkContext& work, const TimingLookup& timings) {
+    if (!knows_doses(rig)) return run_capture(begun.plan, rig, devices, sink, work, timings);
+    const fs::path folder = fs::absolute(begun.writer.folder());
+    DoseBook book(folder.parent_path());
+    DosedLamps lamps(devices.lamps, devices.clock, rig, book, begun.writer.info().object, folder.filename().string());
+    lamps.require_room_for(lamps_to_come(begun));
+    const CaptureSummary summary =
+        run_capture(begun.plan, rig, {lamps, devices.camera, devices.clock}, sink, work, timings);
+    lamps.finish();
+    sink.note_event(fmt::format("light dose: {:.4g} lux s, {:.4g} J/m2 of ultraviolet, {:.4g} J/m2 of infrared",
+                                lamps.given().lux_s, lamps.given().uv_j_per_m2, lamps.given().ir_j_per_m2));
+    return summary;
+}
+
 }  // namespace
 
 CaptureGeometry geometry_of(const RigDescription& rig) {
@@ -120,7 +153,7 @@ CapturedSession capture_session(const CaptureRequest& request, const RigDescript
     CaptureSummary summary;
     {
         SessionRecorder recorder(begun.writer);
-        summary = run_capture(begun.plan, rig, {lamps, camera, clock}, recorder, work, timings);
+        summary = take_shots(begun, rig, {lamps, camera, clock}, recorder, work, timings);
         recorder.finish();
     }
     return {begun.writer.seal(), summary};

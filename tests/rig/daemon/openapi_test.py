@@ -111,6 +111,16 @@ def work_the_queue(api):
     assert api.call("enqueueJob", {"kind": "process", "session": "absent"}).status == 404
 
 
+def tell_doses(api, sessions):
+    assert api.call("listDoses").json() == {"limits": {}, "objects": []}
+    line = '{"object":"vase","lux_s":12.5,"uv_j_per_m2":0,"ir_j_per_m2":0.25}\n'
+    (sessions / ".darkbox" / "dose.jsonl").write_text(2 * line)
+    assert api.call("listDoses").json()["objects"] == [
+        {"object": "vase", "lux_s": 25, "uv_j_per_m2": 0, "ir_j_per_m2": 0.5}]
+    (sessions / ".darkbox" / "dose.jsonl").write_text("{}\n")
+    assert api.call("listDoses").status == 400
+
+
 def make_mistakes(api):
     assert api.call("enqueueJob", {"kind": "bake"}, check_body=False).status == 400
     assert api.call("enqueueJob", {"kind": "export", "session": "vase"}, check_body=False).status == 400
@@ -143,6 +153,7 @@ def main():
             check_document(api.document)
             look_into_files(api, drive_a_capture(api))
             work_the_queue(api)
+            tell_doses(api, pathlib.Path(folder) / "sessions")
             make_mistakes(api)
         finally:
             process.terminate()
