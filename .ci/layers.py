@@ -15,7 +15,7 @@ PROCESSING = [
     {"processing/relight", "processing/transfer"}, {"processing/formats"}, {"processing/pipeline"},
 ]
 FIRMWARE = [{"firmware/protocol"}, {"firmware/lampctl"}, {"firmware/board/atmega32u4", "firmware/board/host"}]
-ROOTS = [{"sim"}, {"rig/daemon"}, {"rig/cli"}]  # may include both columns
+ROOTS = [{"sim"}, {"rig/health"}, {"rig/daemon"}, {"rig/cli"}]  # may include both columns
 BRIDGES = {("processing/pipeline", "acquisition/session")}
 FOLDERS = set().union(*CAPTURE, *PROCESSING, *FIRMWARE, *ROOTS)
 

@@ -35,8 +35,9 @@ std::vector<std::uint16_t> expose(const Sensor& sensor, std::span<const float> r
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
             CounterRandom random = frame_random.child(i);
             const double shot = poisson(radiance[i] * electrons_per_radiance, random);
-            const double electrons =
-                std::min(shot, sensor.well_margin * sensor.full_well_e) + sensor.read_noise_e * random.normal();
+            const double held = std::min(shot, sensor.well_margin * sensor.full_well_e);
+            const double bent = 4 * sensor.nonlinearity * held * (1 - held / sensor.full_well_e);
+            const double electrons = held + bent + sensor.read_noise_e * random.normal();
             const double sample = std::round(sensor.black_level + samples_per_electron * electrons);
             samples[i] = static_cast<std::uint16_t>(std::clamp(sample, 0.0, double(sensor.full_scale())));
         }

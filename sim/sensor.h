@@ -8,7 +8,7 @@
 
 namespace darkbox::sim {
 
-/// A linear sensor. Plain data.
+/// A sensor, linear but for `nonlinearity`. Plain data.
 struct Sensor {
     int bit_depth = 12;          ///< 8 to 16
     double black_level = 64;     ///< sample units
@@ -17,6 +17,7 @@ struct Sensor {
     double read_noise_e = 5;     ///< standard deviation, before the gain
     double full_scale_radiance = 1.05;  ///< that fills the well in reference_exposure_s
     double reference_exposure_s = 0.02;
+    double nonlinearity = 0.0;  ///< a well filled by x counts x + 4 nonlinearity x (1 - x) of full_well_e
     std::uint64_t seed = 1;
 
     int full_scale() const { return (1 << bit_depth) - 1; }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "acquisition/device/device_error.h"
+#include "sim/optics.h"
 
 namespace darkbox::sim {
 namespace {
@@ -79,6 +80,7 @@ CameraInfo SimCamera::configure(const CameraConfig& config) {
 
 void SimCamera::start() {
     if (state_ != State::ready) throw std::logic_error("SimCamera::start in a state other than ready");
+    fail_while_unplugged();
     state_ = State::streaming;
     stream_start_ = clock_.now();
     first_sequence_ = next_strobe_ = next_sequence_;
@@ -148,8 +150,42 @@ void SimCamera::wait_for_frame(TimePoint deadline) {
     }
 }
 
+/// What the driver's counter says of it.
+std::uint64_t SimCamera::counted(std::uint64_t sequence) const {
+    for (const Fault& fault : options_.faults.faults)
+        if (fault.kind == FaultKind::sequence_wrap && fault.at <= sequence) return sequence - fault.at;
+    return sequence;
+}
+
+/// What a knock or a lens out of focus makes of it.
+RgbImage SimCamera::seen(RgbImage light, std::uint64_t sequence) const {
+    const FaultPlan& faults = options_.faults;
+    const auto object_knock = faults.amount(FaultKind::object_knock, sequence);
+    if (object_knock) {
+        const RgbImage still = std::exchange(light, shifted(light, *object_knock));
+        for (const MirrorBall& ball : scene_.balls) copy_disc(still, ball_circle(scene_.view, ball.sphere), light);
+    }
+    if (const auto knock = faults.amount(FaultKind::camera_knock, sequence)) light = shifted(light, *knock);
+    if (const auto sigma_px = faults.amount(FaultKind::defocus, sequence)) light = blurred(light, *sigma_px);
+    return light;
+}
+
+/// Gone from the plan's frame on, until it was started anew `count` times, the last time with success.
+void SimCamera::fail_while_unplugged() {
+    for (std::size_t i = 0; i < options_.faults.faults.size(); ++i) {
+        const Fault& fault = options_.faults.faults[i];
+        std::uint64_t& calls = waits_hung_[i];
+        if (fault.kind != FaultKind::unplug || next_sequence_ < fault.at || calls > fault.count) continue;
+        const bool starts = state_ == State::ready;
+        if (starts == (calls > 0)) ++calls;  // the first call that fails waits for a frame; then starts count
+        if (calls == 0 || calls > fault.count) continue;
+        throw DeviceError("the simulated camera was unplugged", "plug it in again");
+    }
+}
+
 Frame SimCamera::next_frame(TimePoint deadline) {
     if (state_ != State::streaming) throw std::logic_error("SimCamera::next_frame while not streaming");
+    fail_while_unplugged();
     wait_for_frame(deadline);
     Exposure oldest = queue_.front();
     queue_.pop_front();
@@ -169,17 +205,18 @@ Frame SimCamera::deliver(const Exposure& e) {
     const auto burning = black ? std::vector<LampShare>{} : lamps_.burning_during(picture.interval);
     exposures_.push_back({e.sequence, e.interval.begin, burning});
 
-    const Sensor& sensor = options_.sensor;
+    Sensor sensor = options_.sensor;
+    sensor.nonlinearity = faults.amount(FaultKind::nonlinear, picture.sequence).value_or(0.0);
     Frame frame;
     frame.width = scene_.view.width;
     frame.height = scene_.view.height;
     frame.format = format_of(sensor);
     frame.bit_depth = sensor.bit_depth;
     frame.black_level = sensor.black_level;
-    frame.pixels = as_bytes(
-        expose(sensor, light_of(burning), {picture.controls.exposure.count(), picture.controls.gain, picture.sequence}),
-        frame.format);
-    frame.sequence = e.sequence;
+    frame.pixels = as_bytes(expose(sensor, seen(light_of(burning), picture.sequence),
+                                   {picture.controls.exposure.count(), picture.controls.gain, picture.sequence}),
+                            frame.format);
+    frame.sequence = counted(e.sequence);
     frame.timestamp = e.interval.begin;
     frame.exposure = e.interval;
     frame.controls = e.controls;

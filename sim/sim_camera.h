@@ -66,6 +66,9 @@ private:
     void wait_for_frame(TimePoint deadline);
     bool hangs();
     Frame deliver(const Exposure& e);
+    void fail_while_unplugged();
+    std::uint64_t counted(std::uint64_t sequence) const;
+    RgbImage seen(RgbImage light, std::uint64_t sequence) const;
     RgbImage light_of(const std::vector<LampShare>& burning);
     const RgbImage& picture_of(LampId lamp);
 
@@ -82,8 +85,9 @@ private:
     std::uint64_t next_sequence_ = 0;   ///< to be exposed
     std::uint64_t next_strobe_ = 0;     ///< the frame whose end of exposure is not told yet
     std::deque<Exposure> queue_;
-    std::vector<std::uint64_t> waits_hung_;  ///< for each fault of the plan
-    std::vector<RgbImage> pictures_;         ///< one for each lamp, made when the first is needed
+    std::vector<std::uint64_t>
+        waits_hung_;  ///< for each fault of the plan; of an unplugged camera: calls that failed, and starts
+    std::vector<RgbImage> pictures_;  ///< one for each lamp, made when the first is needed
     std::vector<ExposureTruth> exposures_;
 };
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "acquisition/device/device_error.h"
@@ -12,6 +13,17 @@ namespace {
 
 /// The call before the first: what burns of its own from the start.
 constexpr std::uint64_t before_any_call = 0;
+
+/// Light of pulses with a duty of one half, over the light of their mean. From the clock's origin to t the pulses have
+/// shone for half of every whole period, and for all of the rest up to half a period.
+double pulsed_share(const Interval& interval, double hertz) {
+    const auto shone_until = [&](TimePoint moment) {
+        const double periods = to_seconds(moment.time_since_epoch()) * hertz;
+        return 0.5 * std::floor(periods) + std::min(periods - std::floor(periods), 0.5);
+    };
+    const double periods = to_seconds(interval.end - interval.begin) * hertz;
+    return 2.0 * (shone_until(interval.end) - shone_until(interval.begin)) / periods;
+}
 
 }  // namespace
 
@@ -81,6 +93,11 @@ std::vector<LampShare> SimLamps::really_burning(std::vector<LampShare> burning, 
         if (fault.kind == FaultKind::stuck_lamp &&
             std::none_of(burning.begin(), burning.end(), [&](const LampShare& b) { return b.lamp == fault.lamp; }))
             burning.push_back({fault.lamp, 1.0});
+        const auto lit =
+            std::find_if(burning.begin(), burning.end(), [&](const LampShare& b) { return b.lamp == fault.lamp; });
+        if (fault.kind == FaultKind::dim_lamp && lit != burning.end()) lit->share *= fault.amount;
+        if (fault.kind == FaultKind::leaking_lamp && lit != burning.end())
+            burning.push_back({fault.other, fault.amount * lit->share});
         if (fault.kind == FaultKind::swapped_lamps)
             for (LampShare& b : burning)
                 b.lamp = b.lamp == fault.lamp ? fault.other : b.lamp == fault.other ? fault.lamp : b.lamp;
@@ -89,7 +106,10 @@ std::vector<LampShare> SimLamps::really_burning(std::vector<LampShare> burning, 
 }
 
 std::vector<LampShare> SimLamps::burning_during(const Interval& interval) const {
-    return sim::burning_during(history_, interval);
+    auto burning = sim::burning_during(history_, interval);
+    if (const auto hertz = faults_.amount(FaultKind::pwm, switches()))
+        for (LampShare& b : burning) b.share *= pulsed_share(interval, *hertz);
+    return burning;
 }
 
 }  // namespace darkbox::sim

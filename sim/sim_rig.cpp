@@ -37,8 +37,10 @@ Sensor sensor_of(const SimDescription& sim) {
     return sensor;
 }
 
-SimRig SimRig::make(const RigDescription& rig, const FaultPlan& faults) {
+SimRig SimRig::make(const RigDescription& rig, const FaultPlan& more_faults) {
     validate(rig.sim);
+    FaultPlan faults = parse_faults(rig.sim.faults);
+    faults.faults.insert(faults.faults.end(), more_faults.faults.begin(), more_faults.faults.end());
     SimRig result;
     result.scene_ =
         std::make_unique<const Scene>(scene_by_name(rig.sim, rig.lamps, rig.ball_diameter_mm.value_or(36.0)));
@@ -54,6 +56,7 @@ SimRig SimRig::make(const RigDescription& rig, const FaultPlan& faults) {
     if (!rig.sim.lamps_seen.empty()) result.seen_ = std::make_unique<SeenLamps>(rig);
     LampWitness& witness = result.seen_ ? static_cast<LampWitness&>(*result.seen_) : *result.lamps_;
     result.camera_ = std::make_unique<SimCamera>(*result.scene_, witness, *result.clock_, options);
+    result.door_ = std::make_unique<SimDoor>(*result.camera_, faults);
     return result;
 }
 
@@ -64,6 +67,7 @@ SimRig& SimRig::operator=(SimRig&& other) noexcept {
     lamps_ = std::move(other.lamps_);
     seen_ = std::move(other.seen_);
     camera_ = std::move(other.camera_);
+    door_ = std::move(other.door_);
     return *this;
 }
 

@@ -9,6 +9,7 @@
 #include "sim/seen_lamps.h"
 #include "sim/sim_camera.h"
 #include "sim/sim_clock.h"
+#include "sim/sim_door.h"
 #include "sim/sim_lamps.h"
 
 namespace darkbox::sim {
@@ -20,9 +21,10 @@ Sensor sensor_of(const SimDescription& sim);
 /// other and stay where they are. Thread-compatible; the clock is thread-safe.
 class SimRig {
 public:
-    /// The scene, sensor and lamps of the description. Throws InputError for an unknown scene or a value out of range.
+    /// The scene, sensor, lamps and faults of the description. Throws InputError for an unknown scene or fault, or a
+    /// value out of range.
     /// The scene is rendered when the first lit frame is asked for.
-    static SimRig make(const RigDescription& rig, const FaultPlan& faults = {});
+    static SimRig make(const RigDescription& rig, const FaultPlan& more_faults = {});
 
     SimRig(SimRig&&) noexcept = default;
     SimRig& operator=(SimRig&& other) noexcept;
@@ -32,6 +34,7 @@ public:
     /// Where sim.lamps_seen names a file, the camera does not see these.
     SimLamps& lamps() { return *lamps_; }
     SimCamera& camera() { return *camera_; }
+    SimDoor& door() { return *door_; }
     const Scene& scene() const { return *scene_; }
 
     /// Ground truth of the scene and of every frame delivered so far; see sim/truth.h for the files.
@@ -45,6 +48,7 @@ private:
     std::unique_ptr<SimLamps> lamps_;
     std::unique_ptr<SeenLamps> seen_;  ///< what the camera sees instead
     std::unique_ptr<SimCamera> camera_;
+    std::unique_ptr<SimDoor> door_;
 };
 
 }  // namespace darkbox::sim

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <set>
@@ -10,6 +11,8 @@
 #include <sstream>
 
 #include "acquisition/frame/error.h"
+#include "rig/capture/dosed_lamps.h"
+#include "rig/capture/light_dose.h"
 #include "rig/capture/meter.h"
 #include "rig/capture/retake.h"
 #include "rig/capture/session_recorder.h"
@@ -81,6 +84,19 @@ void keep_rig(SessionWriter& writer, const RigDescription& rig) {
     writer.add_extra(rig_file, std::as_bytes(std::span(rig.toml)));
 }
 
+/// Metering's light counts, too.
+Metering meter(const CaptureRequest& request, const RigDescription& rig, const CaptureDevices& devices,
+               const WorkContext& work, const TimingLookup& timings) {
+    const std::vector<LampId> wanted = lamps_named(rig, request.lamps);
+    if (!knows_doses(rig)) return meter_exposure(rig, wanted, devices, work, timings);
+    const fs::path folder = fs::absolute(request.folder);
+    DoseBook book(folder.parent_path());
+    DosedLamps lamps(devices.lamps, devices.clock, rig, book, request.object, folder.filename().string());
+    const Metering found = meter_exposure(rig, wanted, {lamps, devices.camera, devices.clock}, work, timings);
+    lamps.finish();
+    return found;
+}
+
 /// Sets rig.camera.exposure to what the request wants; says what was found where that was metered.
 std::optional<std::string> settle_exposure(const CaptureRequest& request, RigDescription& rig,
                                            const CaptureDevices& devices, const WorkContext& work,
@@ -90,7 +106,7 @@ std::optional<std::string> settle_exposure(const CaptureRequest& request, RigDes
         if (request.exposure) rig.camera.exposure = *request.exposure->fixed;
         return std::nullopt;
     }
-    const Metering found = meter_exposure(rig, lamps_named(rig, request.lamps), devices, work, timings);
+    const Metering found = meter(request, rig, devices, work, timings);
     rig.camera.exposure = found.exposure;
     return found.words();
 }
@@ -172,6 +188,36 @@ Begun resume(const CaptureRequest& request, RigDescription& rig) {
     return {std::move(writer), std::move(begun.plan), std::move(begun.order)};
 }
 
+/// The plan's lamps whose frames are not there yet.
+std::vector<LampId> lamps_to_come(const Begun& begun) {
+    std::vector<LampId> lamps;
+    for (const Shot& shot : begun.plan.shots) {
+        const auto& records = begun.writer.acknowledged();
+        const bool there = std::any_of(records.begin(), records.end(), [&](const FrameRecord& record) {
+            return fs::path(record.file).stem() == shot.name;
+        });
+        if (shot.lamp && !there) lamps.push_back(*shot.lamp);
+    }
+    return lamps;
+}
+
+/// Takes the shots, and counts the light they cost the object where the lamps tell what they give. Nothing is lit when
+/// the budget cannot bear the shots that are to come.
+CaptureSummary take_shots(Begun& begun, const RigDescription& rig, const CaptureDevices& devices, FrameSink& sink,
+                          const WorkContext& work, const TimingLookup& timings) {
+    if (!knows_doses(rig)) return run_capture(begun.plan, rig, devices, sink, work, timings);
+    const fs::path folder = fs::absolute(begun.writer.folder());
+    DoseBook book(folder.parent_path());
+    DosedLamps lamps(devices.lamps, devices.clock, rig, book, begun.writer.info().object, folder.filename().string());
+    lamps.require_room_for(lamps_to_come(begun));
+    const CaptureSummary summary =
+        run_capture(begun.plan, rig, {lamps, devices.camera, devices.clock}, sink, work, timings);
+    lamps.finish();
+    sink.note_event(fmt::format("light dose: {:.4g} lux s, {:.4g} J/m2 of ultraviolet, {:.4g} J/m2 of infrared",
+                                lamps.given().lux_s, lamps.given().uv_j_per_m2, lamps.given().ir_j_per_m2));
+    return summary;
+}
+
 }  // namespace
 
 CaptureGeometry geometry_of(const RigDescription& rig) {
@@ -213,7 +259,7 @@ CapturedSession capture_session(const CaptureRequest& request, const RigDescript
     {
         SessionRecorder recorder(begun.writer);
         ToldSink told(recorder, request.listener);
-        summary = run_capture(begun.plan, rig, devices, told, work, timings);
+        summary = take_shots(begun, rig, devices, told, work, timings);
         recorder.finish();
     }
     return {begun.writer.seal(begun.order), summary};

@@ -135,13 +135,16 @@ int CommandLine::parse_and_run(int argc, char** argv) {
     const CommandResult result = run_chosen(work);
     bar.finish();
     for (const std::string& warning : result.warnings) print_warning(warning);
+    for (const std::string& failure : result.failures) print_error(failure, "");
     if (json_) {
         Json json = result.json;
         if (!json.contains("warnings")) json["warnings"] = result.warnings;
+        if (!result.failures.empty()) json["failures"] = result.failures;
         put_out(printed(json) + "\n");
     } else if (!result.text.empty()) {
         put_out(result.text + "\n");
     }
+    if (!result.failures.empty()) return exit_failed;
     return strict_ && !result.warnings.empty() ? exit_warnings : exit_done;
 }
 

@@ -16,9 +16,10 @@ using Json = nlohmann::ordered_json;
 
 /// What a command has to say when it is done.
 struct CommandResult {
-    Json json = Json::object();         ///< what --json prints on stdout
-    std::string text;                   ///< what people read on stdout without --json
-    std::vector<std::string> warnings;  ///< sentences for people; with --strict they make the exit status 3
+    Json json = Json::object();              ///< what --json prints on stdout
+    std::string text;                        ///< what people read on stdout without --json
+    std::vector<std::string> warnings;       ///< sentences for people; with --strict they make the exit status 3
+    std::vector<std::string> failures = {};  ///< what was examined and found wanting; they make the exit status 1
 };
 
 /// Exit statuses, the same for every command.

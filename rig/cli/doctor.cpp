@@ -18,12 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string join_group(const MachineSeen& machine, const std::string& group) {
-    if (std::ranges::find(machine.groups, group) != machine.groups.end())
-        return fmt::format("you are in the group {} already: look at the device's mode with ls -l", group);
-    return fmt::format("sudo usermod -aG {} {}, then log in again", group, machine.user);
-}
-
 std::string listed(const std::vector<fs::path>& paths) {
     std::vector<std::string> names;
     for (const fs::path& path : paths) names.push_back(path.string());
@@ -81,13 +75,13 @@ double megabytes_per_second(std::size_t bytes, std::chrono::steady_clock::time_p
     return static_cast<double>(bytes) / 1e6 / std::max(seconds, 1e-6);
 }
 
-/// What the camera sends at its rate, in 16 bits; 0 where the description leaves it open.
-double camera_megabytes_per_second(const RigDescription& rig) {
-    const double pixels = static_cast<double>(rig.camera.width) * rig.camera.height;
-    return pixels * 2 * rig.camera.frame_rate.value_or(0) / 1e6;
-}
-
 }  // namespace
+
+std::string join_group(const MachineSeen& machine, const std::string& group) {
+    if (std::ranges::find(machine.groups, group) != machine.groups.end())
+        return fmt::format("you are in the group {} already: look at the device's mode with ls -l", group);
+    return fmt::format("sudo usermod -aG {} {}, then log in again", group, machine.user);
+}
 
 Diagnoses diagnose_camera(const RigDescription& rig, const MachineSeen& machine) {
     if (rig.camera.driver == "sim") return {{"camera", Verdict::good, "simulated"}};
@@ -110,7 +104,7 @@ Diagnoses diagnose_camera(const RigDescription& rig, const MachineSeen& machine)
 
 Diagnoses diagnose_lamps(const RigDescription& rig, const MachineSeen& machine) {
     if (rig.lamps_driver == "sim") return {{"lamps", Verdict::good, "simulated"}};
-    if (rig.lamps_driver != "gpio") return {};
+    if (rig.lamps_driver != "gpio") return diagnose_usb_lamps(rig, machine);
     const auto chip = std::ranges::find(machine.chips, rig.gpio.chip, &GpioChipSeen::label);
     if (chip == machine.chips.end()) {
         const auto closed = std::ranges::find(machine.chips, Access::denied, &GpioChipSeen::access);

@@ -34,6 +34,13 @@ struct GpioChipSeen {
     std::vector<GpioLineSeen> lines = {};
 };
 
+/// A lamp controller that is plugged in.
+struct LampBoardSeen {
+    std::filesystem::path node;  ///< below /dev/bus/usb
+    Access access = Access::open;
+    std::string serial = {};
+};
+
 /// What the machine shows, gathered apart from what is made of it.
 struct MachineSeen {
     std::string user;
@@ -43,11 +50,27 @@ struct MachineSeen {
     std::vector<std::filesystem::path> cameras;  ///< by their stable names
     std::string camera_group = "video";
     bool udev_rules = false;
+    std::vector<LampBoardSeen> boards = {};
+    bool lamp_rules = false;                     ///< udev's, for lamp controllers
+    std::optional<double> camera_bus_mbit = {};  ///< a second; none: not known, or no USB camera
 };
 MachineSeen look_at_machine(const RigDescription& rig);
 
 Diagnoses diagnose_camera(const RigDescription& rig, const MachineSeen& machine);
 Diagnoses diagnose_lamps(const RigDescription& rig, const MachineSeen& machine);
+
+Diagnoses diagnose_usb_lamps(const RigDescription& rig, const MachineSeen& machine);
+/// Whether the camera's USB carries what its mode sends; nothing where either is not known.
+Diagnoses diagnose_camera_bus(const RigDescription& rig, const MachineSeen& machine);
+
+/// The remedy for a device that its group may use and this user may not.
+std::string join_group(const MachineSeen& machine, const std::string& group);
+
+/// The lamp controllers and the camera's bus, as sysfs shows them.
+void look_at_usb(const RigDescription& rig, MachineSeen& machine);
+
+/// What the camera sends at its rate, in megabytes a second; 0 where the description leaves it open.
+double camera_megabytes_per_second(const RigDescription& rig);
 
 /// Writes and flushes a file there, and removes it: whether that works, and how fast.
 Diagnoses diagnose_disk(const RigDescription& rig, const std::filesystem::path& sessions);

@@ -46,6 +46,7 @@ Diagnoses diagnose(const Arguments& a) {
             {"rig", Verdict::good, fmt::format("{}: {}, {} lamps", a.rig.string(), rig.name, rig.lamps.size())});
         const MachineSeen machine = look_at_machine(rig);
         take(diagnose_camera(rig, machine));
+        take(diagnose_camera_bus(rig, machine));
         take(diagnose_lamps(rig, machine));
         const fs::path sessions = !a.sessions.empty()            ? a.sessions
                                   : !rig.sessions_folder.empty() ? rig.sessions_folder

@@ -93,6 +93,7 @@ MachineSeen look_at_machine(const RigDescription& rig) {
     machine.camera_group = group_of(camera);
     for (const char* folder : {"/lib/udev/rules.d", "/etc/udev/rules.d"})
         machine.udev_rules = machine.udev_rules || fs::exists(fs::path(folder) / "60-darkbox.rules");
+    look_at_usb(rig, machine);
     return machine;
 }
 

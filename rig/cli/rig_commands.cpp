@@ -2,11 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 
 #include "rig/capture/capture_run.h"
+#include "rig/capture/dosed_lamps.h"
+#include "rig/capture/light_dose.h"
 #include "rig/daemon/client.h"
 #include "rig/daemon/hardware.h"
+#include "rig/daemon/session_folder.h"
+#include "rig/health/rig_check.h"
 
 namespace darkbox {
 namespace {
@@ -17,6 +22,9 @@ struct Arguments {
     fs::path rig;
     fs::path socket;
     bool camera = false;
+    bool measure = false;
+    std::string object;
+    fs::path sessions;
 };
 
 DaemonClient client_for(const Arguments& a) { return DaemonClient(a.socket.empty() ? default_socket() : a.socket); }
@@ -26,7 +34,25 @@ Json ask(const DaemonClient& client, const std::string& method, const std::strin
     return Json::parse(client.call(method, target).dump());
 }
 
-CommandResult rig_status(const Arguments& a) {
+/// The objects that have had most light, and all of them for --json.
+void tell_doses(const Json& answer, CommandResult& result) {
+    constexpr std::size_t shown = 10;
+    result.json["dose"] = answer;
+    std::vector<Json> objects = answer.at("objects");
+    std::stable_sort(objects.begin(), objects.end(), [](const Json& a, const Json& b) {
+        return a.at("lux_s").get<double>() > b.at("lux_s").get<double>();
+    });
+    const Json& limits = answer.at("limits");
+    const std::string budget =
+        limits.contains("object_lux_s") ? fmt::format(" of {:.4g}", limits.at("object_lux_s").get<double>()) : "";
+    for (std::size_t i = 0; i < std::min(shown, objects.size()); ++i)
+        result.text +=
+            fmt::format("\nlight on {}: {:.4g}{} lux s, {:.4g} J/m2 UV, {:.4g} J/m2 IR",
+                        objects[i].at("object").get<std::string>(), objects[i].at("lux_s").get<double>(), budget,
+                        objects[i].at("uv_j_per_m2").get<double>(), objects[i].at("ir_j_per_m2").get<double>());
+}
+
+CommandResult rig_status(const Arguments& a, const WorkContext&) {
     CommandResult result;
     result.json = ask(client_for(a), "GET", "status");
     result.text =
@@ -38,6 +64,7 @@ CommandResult rig_status(const Arguments& a) {
         result.text += fmt::format("\ncapturing {}: {} of {}", job.at("session").get<std::string>(),
                                    job.at("progress").at("done").get<int>(), job.at("progress").at("total").get<int>());
     }
+    tell_doses(ask(client_for(a), "GET", "dose"), result);
     if (result.json.contains("problem")) result.warnings.push_back(result.json.at("problem"));
     return result;
 }
@@ -60,7 +87,43 @@ void tell_camera(const CameraInfo& camera, CommandResult& result) {
     for (const std::string& note : camera.notes) result.text += "\n" + note;
 }
 
-CommandResult rig_check(const Arguments& a) {
+Json number_or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
+/// The light of a check is counted as a capture's is.
+RigReport measured(const Arguments& a, const RigDescription& rig, const CaptureDevices& devices,
+                   const WorkContext& work) {
+    if (!knows_doses(rig)) return check_rig(rig, devices, {}, work);
+    DoseBook book(a.sessions.empty() ? default_sessions_folder() : a.sessions);
+    DosedLamps lamps(devices.lamps, devices.clock, rig, book, a.object, "rig check");
+    RigReport report = check_rig(rig, {lamps, devices.camera, devices.clock}, {}, work);
+    lamps.finish();
+    return report;
+}
+
+void measure_rig(const Arguments& a, const RigDescription& rig, const WorkContext& work, CommandResult& result) {
+    Hardware hardware(rig);
+    RigReport report;
+    hardware.open()->lend([&](const CaptureDevices& devices) { report = measured(a, rig, devices, work); });
+    Json findings = Json::array();
+    for (const RigFinding& f : report.findings)
+        findings.push_back({{"what", f.what},
+                            {"where", f.where},
+                            {"value", number_or_null(f.value)},
+                            {"limit", number_or_null(f.limit)},
+                            {"unit", f.unit},
+                            {"verdict", name(f.verdict)},
+                            {"words", f.words}});
+    result.json["good"] = report.good();
+    result.json["findings"] = std::move(findings);
+    result.text += "\n" + report.table();
+    result.failures = report.failures();
+    for (const RigFinding& f : report.findings)
+        if (f.verdict == RigVerdict::untold)
+            result.warnings.push_back(
+                fmt::format("{}{} was not measured: {}", f.what, f.where.empty() ? "" : " of " + f.where, f.words));
+}
+
+CommandResult rig_check(const Arguments& a, const WorkContext& work) {
     const RigDescription rig = load_rig(a.rig);
     const CapturePlan plan = plan_capture(rig);
     CommandResult result;
@@ -72,10 +135,11 @@ CommandResult rig_check(const Arguments& a) {
     result.text = fmt::format("{} is valid: rig {}, {} {} lamps, {} camera, {} shots for all of them", a.rig.string(),
                               rig.name, rig.lamps.size(), rig.lamps_driver, rig.camera.driver, plan.shots.size());
     if (a.camera) tell_camera(check_camera(rig), result);
+    if (a.measure) measure_rig(a, rig, work, result);
     return result;
 }
 
-using Run = CommandResult (*)(const Arguments&);
+using Run = CommandResult (*)(const Arguments&, const WorkContext&);
 
 struct Added {
     CLI::App& command;
@@ -84,7 +148,8 @@ struct Added {
 
 Added add(CommandLine& line, CLI::App* group, const char* name, const char* description, const char* example, Run run) {
     const auto a = std::make_shared<Arguments>();
-    return {line.add(name, description, example, [a, run](const WorkContext&) { return run(*a); }, group), a};
+    return {
+        line.add(name, description, example, [a, run](const WorkContext& work) { return run(*a, work); }, group), a};
 }
 
 void add_to_daemon(CommandLine& line, CLI::App& group, const char* name, const char* description, const char* example,
@@ -98,10 +163,21 @@ void add_to_daemon(CommandLine& line, CLI::App& group, const char* name, const c
 void add_rig_commands(CommandLine& line) {
     CLI::App& rig = line.add_group("rig", "The rig as darkboxd sees it, and its description");
     add_to_daemon(line, rig, "status", "What darkboxd is doing", "darkbox rig status", rig_status);
-    const auto [check, check_arguments] = add(line, &rig, "check", "Check a rig.toml, and its camera if asked to",
-                                              "darkbox rig check --rig rig.toml", rig_check);
+    const auto [check, check_arguments] =
+        add(line, &rig, "check", "Check a rig.toml, and its camera, lamps and place if asked to",
+            "darkbox rig check --rig rig.toml --measure", rig_check);
     check.add_option("--rig", check_arguments->rig, "The rig's description")->required();
     check.add_flag("--camera", check_arguments->camera, "Set up the camera, too, and tell what is in effect");
+    auto* measure =
+        check.add_flag("--measure", check_arguments->measure,
+                       "Light the lamps and measure linearity, flicker, leaks, dim lamps, focus and clipping; status "
+                       "1 when one is beyond its limit");
+    check.add_option("--object", check_arguments->object, "What stands in the light: its dose is counted")
+        ->needs(measure);
+    check
+        .add_option("--sessions", check_arguments->sessions,
+                    "The folder whose book of doses counts; default: $DARKBOX_SESSIONS, ./sessions")
+        ->needs(measure);
 
     add_measure_latency_command(line, rig);
     add_rig_plan_command(line, rig);

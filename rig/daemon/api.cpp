@@ -137,6 +137,7 @@ const std::vector<Api::Route>& Api::table() {
     static const std::vector<Route> routes{
         {"GET", "status", {}, &Api::status},
         {"GET", "lamps", {}, &Api::lamps},
+        {"GET", "dose", {}, &Api::dose},
         {"POST", "lamps/dark", {}, &Api::darken},
         {"GET", "events", {"after"}, &Api::events},
         {"GET", "preview", {}, &Api::preview},

@@ -74,6 +74,7 @@ private:
     ApiResponse route(const ApiRequest& request) const;
     ApiResponse status(const Call& call) const;
     ApiResponse lamps(const Call& call) const;
+    ApiResponse dose(const Call& call) const;
     ApiResponse darken(const Call& call) const;
     ApiResponse events(const Call& call) const;
     ApiResponse start_capture(const Call& call) const;

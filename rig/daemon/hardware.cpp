@@ -8,6 +8,7 @@
 #include "acquisition/camera/v4l2_camera.h"
 #include "acquisition/device/device_error.h"
 #include "acquisition/frame/error.h"
+#include "rig/capture/interlock.h"
 #include "rig/capture/timing_store.h"
 #include "rig/lamps/gpio_lamps.h"
 #include "rig/lamps/usb_lamps.h"
@@ -33,6 +34,29 @@ std::optional<MeasuredTiming> measured(const CameraInfo& camera) {
     return stored_timing(default_timing_file(), camera);
 }
 
+/// Lets work drive the lamps and the camera, behind the door's switch where there is one.
+void drive(const CaptureDevices& devices, Door* door, const std::function<void(const CaptureDevices&)>& work) {
+    if (door == nullptr) return work(devices);
+    InterlockedLamps lamps(devices.lamps, *door);
+    InterlockedCamera camera(devices.camera, lamps);
+    work({lamps, camera, devices.clock});
+}
+
+CaptureOutcome capture_with(const CaptureDevices& devices, Door* door, const CaptureRequest& request,
+                            const RigDescription& rig, const WorkContext& work) {
+    const auto start = Stopwatch::now();
+    CaptureOutcome outcome;
+    drive(devices, door, [&](const CaptureDevices& d) {
+        const auto [session, summary] = capture_session(request, rig, d.lamps, d.camera, d.clock, work, measured);
+        outcome = {.session = session.folder(),
+                   .frames = session.frames().size(),
+                   .resumed = summary.resumed,
+                   .repeated = summary.repeated};
+    });
+    outcome.duration = Stopwatch::now() - start;
+    return outcome;
+}
+
 /// Its camera sees simulated lamps, or those of an emulated board, which are driven as real ones.
 class SimulatedRig final : public CaptureRig {
 public:
@@ -40,26 +64,22 @@ public:
         : rig_(rig), sim_(sim::SimRig::make(rig)), driven_(std::move(driven)) {}
 
     CaptureOutcome capture(const CaptureRequest& request, const WorkContext& work) override {
-        const auto start = Stopwatch::now();
         sim_ = sim::SimRig::make(rig_);  // its truth is of this capture alone
-        const auto [session, summary] =
-            capture_session(request, rig_, lamps(), sim_.camera(), sim_.clock(), work, measured);
-        write_truth(session.folder());
-        return {.session = session.folder(),
-                .frames = session.frames().size(),
-                .resumed = summary.resumed,
-                .repeated = summary.repeated,
-                .duration = Stopwatch::now() - start};
+        const CaptureOutcome outcome =
+            capture_with({lamps(), sim_.camera(), sim_.clock()}, door(), request, rig_, work);
+        write_truth(outcome.session);
+        return outcome;
     }
 
     void lend(const std::function<void(const CaptureDevices&)>& work) override {
         const DarkOnExit dark_on_exit(lamps());
-        work({lamps(), sim_.camera(), sim_.clock()});
+        drive({lamps(), sim_.camera(), sim_.clock()}, door(), work);
     }
 
     void dark() override { lamps().dark(); }
 
 private:
+    Door* door() { return rig_.door ? &sim_.door() : nullptr; }
     LampArray& lamps() { return driven_ ? *driven_ : static_cast<LampArray&>(sim_.lamps()); }
 
     /// All of it or nothing: the session is sealed by now and complete without it.
@@ -88,21 +108,17 @@ private:
 class RealRig final : public CaptureRig {
 public:
     RealRig(const RigDescription& rig, std::unique_ptr<LampArray> lamps)
-        : rig_(rig), camera_(device_, clock_, v4l2_options(rig.camera)), lamps_(std::move(lamps)) {}
+        : rig_(rig), camera_(device_, clock_, v4l2_options(rig.camera)), lamps_(std::move(lamps)) {
+        if (rig.door) door_ = std::make_unique<GpioDoor>(*rig.door, request_gpio_input);
+    }
 
     CaptureOutcome capture(const CaptureRequest& request, const WorkContext& work) override {
-        const auto start = Stopwatch::now();
-        const auto [session, summary] = capture_session(request, rig_, *lamps_, camera_, clock_, work, measured);
-        return {.session = session.folder(),
-                .frames = session.frames().size(),
-                .resumed = summary.resumed,
-                .repeated = summary.repeated,
-                .duration = Stopwatch::now() - start};
+        return capture_with({*lamps_, camera_, clock_}, door_.get(), request, rig_, work);
     }
 
     void lend(const std::function<void(const CaptureDevices&)>& work) override {
         const DarkOnExit dark_on_exit(*lamps_);
-        work({*lamps_, camera_, clock_});
+        drive({*lamps_, camera_, clock_}, door_.get(), work);
     }
 
     void dark() override { lamps_->dark(); }
@@ -112,6 +128,7 @@ private:
     SystemClock clock_;
     KernelVideoDevice device_;
     V4l2Camera camera_;
+    std::unique_ptr<Door> door_;
     std::unique_ptr<LampArray> lamps_;
 };
 

@@ -3,8 +3,12 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <fstream>
+
+#include "rig/capture/dose_book.h"
+#include "rig/daemon/attempt.h"
 
 namespace darkbox {
 namespace {
@@ -29,6 +33,21 @@ std::uint64_t resident_bytes() {
     return resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
 }
 
+/// Nothing where the book cannot be read: a capture says why.
+std::string light_doses(const std::filesystem::path& sessions) {
+    double all = 0, most = 0;
+    const auto failure = attempt([&] {
+        const DoseBook book(sessions);
+        for (const auto& [object, dose] : book.objects()) {
+            all += dose.lux_s;
+            most = std::max(most, dose.lux_s);
+        }
+    });
+    if (failure) return "";
+    return one("darkbox_light_dose_lux_seconds", "gauge", "Light that all objects together have had", all) +
+           one("darkbox_light_dose_largest_lux_seconds", "gauge", "Light of the object that has had most", most);
+}
+
 }  // namespace
 
 std::string Metrics::text(Service& service) const {
@@ -51,6 +70,7 @@ std::string Metrics::text(Service& service) const {
                 service.exposures_repeated());
     text += one("darkbox_sessions", "gauge", "Sessions in the catalogue", service.catalog().session_count());
     text += one("darkbox_disk_free_bytes", "gauge", "Free space where the sessions lie", space.available);
+    text += light_doses(service.sessions());
     text += one("darkbox_events_total", "counter", "Events told to listeners", status.last_event);
     text += head("darkbox_http_requests_total", "counter", "Requests answered, by the status' first digit");
     for (std::size_t digit = 1; digit < requests_.size(); ++digit)

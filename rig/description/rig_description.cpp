@@ -9,6 +9,7 @@
 
 #include "acquisition/frame/error.h"
 #include "rig/description/capture_section.h"
+#include "rig/description/dose_section.h"
 #include "rig/description/toml_section.h"
 
 namespace darkbox {
@@ -99,8 +100,11 @@ void read_output(TomlSection& section, const RigDescription& rig, bool active_lo
 
 LampDescription read_lamp(TomlSection& section, const RigDescription& rig, bool active_low) {
     LampDescription lamp;
-    section.allow(
-        {"name", "line", "active_low", "address", "channel", "position_mm", "max_on_s", "max_duty", "settle_ms"});
+    std::set<std::string> keys{"name",        "line",     "active_low", "address",  "channel",
+                               "position_mm", "max_on_s", "max_duty",   "settle_ms"};
+    keys.insert(lamp_dose_keys.begin(), lamp_dose_keys.end());
+    section.allow(keys);
+    lamp.dose_per_s = read_lamp_dose(section);
     lamp.name = read_lamp_name(section);
     const Seconds exposure = rig.camera.exposure;
     read_output(section, rig, active_low, lamp);
@@ -308,10 +312,28 @@ CameraDescription read_camera(TomlSection& section) {
     return camera;
 }
 
+DoorDescription read_door(TomlSection& section, const RigDescription& rig) {
+    section.allow({"chip", "line", "active_low"});
+    DoorDescription door;
+    const bool simulated = rig.camera.driver == "sim";
+    for (const char* key : {"chip", "line", "active_low"})
+        if (simulated && section.has(key))
+            section.fail(key, fmt::format("{} does not belong to a simulated rig's door", key),
+                         "leave it out: [sim] faults opens the door");
+    door.chip = section.text("chip").value_or(rig.gpio.chip);
+    door.line = section.text_or_digits("line").value_or("");
+    door.active_low = section.flag("active_low").value_or(false);
+    if (!simulated && door.chip.empty())
+        section.fail("chip", "chip is missing", "give the GPIO chip's label (gpiodetect lists the labels)");
+    if (!simulated && door.line.empty())
+        section.fail("line", "line is missing", "name the line that the door's switch hangs on");
+    return door;
+}
+
 SimDescription read_sim(TomlSection& section) {
     SimDescription sim;
     section.allow({"scene", "width", "height", "bit_depth", "full_well_e", "read_noise_e", "latency_frames",
-                   "queue_depth", "seed", "room_light", "real_time", "lamps_seen", "strobe_line"});
+                   "queue_depth", "seed", "room_light", "real_time", "faults", "lamps_seen", "strobe_line"});
     const auto whole = [&](const char* key, Allowed<std::int64_t> allowed, int fallback) {
         return static_cast<int>(section.integer(key, allowed).value_or(fallback));
     };
@@ -328,6 +350,7 @@ SimDescription read_sim(TomlSection& section) {
     sim.seed =
         static_cast<std::uint64_t>(section.integer("seed", any_seed).value_or(static_cast<std::int64_t>(sim.seed)));
     sim.real_time = section.flag("real_time").value_or(sim.real_time);
+    sim.faults = section.text("faults").value_or("");
     sim.lamps_seen = section.text("lamps_seen").value_or("");
     sim.strobe_line = section.text("strobe_line").value_or("");
     if (!sim.strobe_line.empty() && sim.lamps_seen.empty())
@@ -369,7 +392,8 @@ void settle_simulated_camera(RigDescription& rig) {
 }
 
 RigDescription read_rig(TomlSection& root) {
-    root.allow({"rig", "camera", "lamps", "ball", "capture", "processing", "api", "retention", "sim"}, "section");
+    root.allow({"rig", "camera", "lamps", "ball", "door", "dose", "capture", "processing", "api", "retention", "sim"},
+               "section");
     RigDescription rig;
     if (auto section = root.section("rig", "[rig]")) {
         section->allow({"name"});
@@ -391,6 +415,8 @@ RigDescription read_rig(TomlSection& root) {
     settle_simulated_camera(rig);
     if (!lamps) root.fail("lamps", "has no [lamps]", "add [lamps] with a [[lamps.lamp]] for each lamp");
     read_lamps(*lamps, rig);
+    if (auto section = root.section("door", "[door]")) rig.door = read_door(*section, rig);
+    if (auto section = root.section("dose", "[dose]")) rig.dose = read_dose(*section, rig.lamps);
     const bool sees_lamps = rig.camera.driver == "sim" && !rig.sim.lamps_seen.empty();
     if ((rig.camera.driver == "sim") != (rig.lamps_driver == "sim") && !sees_lamps)
         root.fail("lamps", fmt::format("has a \"{}\" camera and \"{}\" lamps", rig.camera.driver, rig.lamps_driver),

@@ -13,6 +13,22 @@
 
 namespace darkbox {
 
+/// What light does to an object: it adds up and never fades.
+struct LightDose {
+    double lux_s = 0;        ///< visible light, lux seconds
+    double uv_j_per_m2 = 0;  ///< ultraviolet
+    double ir_j_per_m2 = 0;  ///< infrared
+};
+
+/// [dose]: how much light an object may be given. What is not limited is counted all the same.
+struct DoseDescription {
+    std::optional<double> object_lux_s;  ///< over all of an object's captures
+    std::optional<double> object_uv_j_per_m2;
+    std::optional<double> object_ir_j_per_m2;
+    std::optional<double> capture_lux_s;               ///< in one capture
+    std::vector<std::string> exempt{"recalibration"};  ///< objects that bear any light, such as the mirror ball
+};
+
 /// One lamp of the rig as rig.toml describes it. Its LampId is its place in RigDescription::lamps.
 struct LampDescription {
     std::string name;                     ///< unique
@@ -24,6 +40,7 @@ struct LampDescription {
     Seconds max_on{2.0};                  ///< longest continuous on-time
     double max_duty = 0.5;                ///< driver "usb": share of a long time that it may shine
     Seconds settle{0.005};                ///< from switch to steady light
+    LightDose dose_per_s;                 ///< what it gives the object in a second; 0: not known
 };
 
 /// A binary decoder between few lines and many lamps.
@@ -37,6 +54,13 @@ struct MultiplexerDescription {
 struct GpioDescription {
     std::string chip;                                   ///< its label
     std::optional<MultiplexerDescription> multiplexer;  ///< none: one line a lamp
+};
+
+/// [door]: a switch that tells whether the box is open.
+struct DoorDescription {
+    std::string chip;         ///< label of the GPIO chip; empty with a simulated camera, whose door is simulated, too
+    std::string line;         ///< name or offset
+    bool active_low = false;  ///< the door is open while the line is low
 };
 
 /// [lamps.usb], of driver "usb".
@@ -96,6 +120,7 @@ struct SimDescription {
     std::uint64_t seed = 1;
     double room_light = 0;                ///< what the room adds: this share of every lamp's light, always
     bool real_time = false;               ///< virtual time otherwise
+    std::string faults{};                 ///< what is to go wrong; see sim/faults.h
     std::filesystem::path lamps_seen{};   ///< the camera sees the lamps that this file tells of, not simulated ones
     std::filesystem::path strobe_line{};  ///< with lamps_seen: where the camera's strobe line is told
 };
@@ -111,6 +136,8 @@ struct RigDescription {
     bool distant_lamps = false;        ///< their light is parallel: behind collimators, or simulated so
     std::optional<double> flicker_hz;  ///< of the lamps' light (PWM, mains): exposures are whole numbers of its periods
     std::optional<double> ball_diameter_mm;
+    DoseDescription dose;
+    std::optional<DoorDescription> door;
     CaptureDescription capture;
     SimDescription sim;
     std::filesystem::path sessions_folder;  ///< [api] sessions; empty = the caller's default

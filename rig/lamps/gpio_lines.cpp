@@ -77,7 +77,19 @@ public:
         return held;
     }
 
+    static std::optional<HeldLines> request_input(Chip& chip, unsigned int offset) {
+        HeldLines held;
+        gpiod_line_bulk_init(&held.lines_);
+        gpiod_line* line = gpiod_chip_get_line(chip.chip_.get(), offset);
+        if (line == nullptr || gpiod_line_request_input(line, consumer) != 0) return std::nullopt;
+        gpiod_line_bulk_add(&held.lines_, line);
+        held.chip_ = std::move(chip.chip_);
+        return held;
+    }
+
     bool set(const Levels& levels) { return gpiod_line_set_value_bulk(&lines_, levels.data()) == 0; }
+    /// Of the only line; below 0 and errno where it cannot be read.
+    int level() { return gpiod_line_get_value(gpiod_line_bulk_get_line(&lines_, 0)); }
 
 private:
     std::unique_ptr<gpiod_chip, CloseChip> chip_;  // closing it releases its lines
@@ -156,6 +168,28 @@ public:
         held.offsets_ = offsets;
         held.request_.reset(gpiod_chip_request_lines(chip.chip_.get(), request.get(), lines.get()));
         return held.request_ ? std::optional(std::move(held)) : std::nullopt;
+    }
+
+    static std::optional<HeldLines> request_input(Chip& chip, unsigned int offset) {
+        const std::unique_ptr<gpiod_line_settings, ReleaseBy<gpiod_line_settings_free>> settings(
+            gpiod_line_settings_new());
+        const std::unique_ptr<gpiod_line_config, ReleaseBy<gpiod_line_config_free>> lines(gpiod_line_config_new());
+        const std::unique_ptr<gpiod_request_config, ReleaseBy<gpiod_request_config_free>> request(
+            gpiod_request_config_new());
+        if (!settings || !lines || !request ||
+            gpiod_line_settings_set_direction(settings.get(), GPIOD_LINE_DIRECTION_INPUT) != 0 ||
+            gpiod_line_config_add_line_settings(lines.get(), &offset, 1, settings.get()) != 0)
+            return std::nullopt;
+        gpiod_request_config_set_consumer(request.get(), consumer);
+        HeldLines held;
+        held.offsets_ = {offset};
+        held.request_.reset(gpiod_chip_request_lines(chip.chip_.get(), request.get(), lines.get()));
+        return held.request_ ? std::optional(std::move(held)) : std::nullopt;
+    }
+
+    int level() {
+        const gpiod_line_value read = gpiod_line_request_get_value(request_.get(), offsets_.front());
+        return read == GPIOD_LINE_VALUE_ERROR ? -1 : read == GPIOD_LINE_VALUE_ACTIVE ? 1 : 0;
     }
 
     bool set(const Levels& levels) {
@@ -250,7 +284,34 @@ private:
     HeldLines held_;
 };
 
+class KernelInput final : public InputLine {
+public:
+    KernelInput(std::string chip, GpioLine line, HeldLines held)
+        : chip_(std::move(chip)), line_(std::move(line)), held_(std::move(held)) {}
+
+    bool active() override {
+        const int read = held_.level();
+        if (read < 0)
+            throw_errno(fmt::format("read line {} of GPIO chip", line_.line), fmt::format("\"{}\"", chip_), errno);
+        return (read == 1) != line_.active_low;
+    }
+
+private:
+    std::string chip_;
+    GpioLine line_;
+    HeldLines held_;
+};
+
 }  // namespace
+
+std::unique_ptr<InputLine> request_gpio_input(const std::string& label, const GpioLine& line) {
+    Chip chip = open_chip(label);
+    const GpioRequest request{label, {line}};
+    const unsigned int offset = find_line(chip, request, line.line);
+    auto held = HeldLines::request_input(chip, offset);
+    if (!held) refuse(chip, request, {offset}, errno);
+    return std::make_unique<KernelInput>(label, line, std::move(*held));
+}
 
 std::unique_ptr<OutputLines> request_gpio_lines(const GpioRequest& request) {
     Chip chip = open_chip(request.chip);

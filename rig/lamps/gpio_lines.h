@@ -35,4 +35,18 @@ using RequestLines = std::function<std::unique_ptr<OutputLines>(const GpioReques
 /// RequestLines of the kernel's GPIO chips, by libgpiod 1.6 or 2.
 std::unique_ptr<OutputLines> request_gpio_lines(const GpioRequest& request);
 
+/// One line held as an input until the destructor releases it. Thread-compatible.
+class InputLine {
+public:
+    virtual ~InputLine() = default;
+    /// Throws DeviceError, also when the chip is gone.
+    virtual bool active() = 0;
+};
+
+/// Requests the line of the chip with this label. Throws as RequestLines does.
+using RequestInput = std::function<std::unique_ptr<InputLine>(const std::string& chip, const GpioLine& line)>;
+
+/// RequestInput of the kernel's GPIO chips.
+std::unique_ptr<InputLine> request_gpio_input(const std::string& chip, const GpioLine& line);
+
 }  // namespace darkbox

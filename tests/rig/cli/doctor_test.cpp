@@ -102,6 +102,48 @@ TEST(Doctor, KnowsChipsAndLinesThatAreNotThere) {
     EXPECT_THAT(only_bad(diagnose_lamps(gpio_rig(), machine)).subject, HasSubstr("line 2"));
 }
 
+RigDescription usb_rig(const std::string& serial = "") {
+    RigDescription rig = gpio_rig();
+    rig.lamps_driver = "usb";
+    rig.usb.serial = serial;
+    return rig;
+}
+
+TEST(Doctor, SaysWhatToDoAboutALampController) {
+    MachineSeen machine = good_machine();
+    EXPECT_THAT(only_bad(diagnose_lamps(usb_rig(), machine)).remedy, HasSubstr("plug it in"));
+    machine.boards = {{.node = "/dev/bus/usb/001/004", .serial = "DBX1"}};
+    EXPECT_EQ(diagnose_lamps(usb_rig(), machine).at(0).verdict, Verdict::good);
+    EXPECT_EQ(diagnose_lamps(usb_rig("DBX1"), machine).at(0).verdict, Verdict::good);
+    EXPECT_THAT(only_bad(diagnose_lamps(usb_rig("DBX2"), machine)).found, HasSubstr("another is plugged in: DBX1"));
+    machine.boards[0].access = Access::denied;
+    EXPECT_THAT(only_bad(diagnose_lamps(usb_rig(), machine)).remedy, HasSubstr("70-darkbox-lamps.rules"));
+    machine.lamp_rules = true;
+    const Diagnosis denied = only_bad(diagnose_lamps(usb_rig(), machine));
+    EXPECT_THAT(denied.found, HasSubstr("eva may not open /dev/bus/usb/001/004"));
+    EXPECT_THAT(denied.remedy, HasSubstr("usermod -aG darkbox eva"));
+    machine.boards.push_back({.node = "/dev/bus/usb/001/005", .serial = "DBX2"});
+    EXPECT_THAT(only_bad(diagnose_lamps(usb_rig(), machine)).found, HasSubstr("2 are plugged in"));
+}
+
+TEST(Doctor, ComparesTheCameraWithItsBus) {
+    RigDescription rig = gpio_rig();
+    MachineSeen machine = good_machine();
+    machine.camera_bus_mbit = 480;
+    EXPECT_TRUE(diagnose_camera_bus(rig, machine).empty());  // its mode is not told
+    rig.camera.width = 1920;
+    rig.camera.height = 1080;
+    rig.camera.frame_rate = 30;  // 124 MB/s
+    const Diagnosis slow = diagnose_camera_bus(rig, machine).at(0);
+    EXPECT_EQ(slow.verdict, Verdict::warning);
+    EXPECT_THAT(slow.found, HasSubstr("124 MB/s at 480 Mbit/s, which carry about 39"));
+    EXPECT_THAT(slow.remedy, HasSubstr("USB 3"));
+    machine.camera_bus_mbit = 5000;
+    EXPECT_EQ(diagnose_camera_bus(rig, machine).at(0).verdict, Verdict::good);
+    machine.camera_bus_mbit.reset();
+    EXPECT_TRUE(diagnose_camera_bus(rig, machine).empty());
+}
+
 TEST(Doctor, MeasuresTheDisk) {
     const test::TemporaryFolder folder;
     const Diagnoses good = diagnose_disk(gpio_rig(), folder.path() / "sessions");

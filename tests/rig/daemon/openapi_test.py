@@ -131,6 +131,16 @@ def work_the_queue(api):
     assert pruned["event"] == "done" and pruned["result"]["kept"] == {"younger than 30 days": 2}, pruned
 
 
+def tell_doses(api, sessions):
+    assert api.call("listDoses").json() == {"limits": {}, "objects": []}
+    line = '{"object":"vase","lux_s":12.5,"uv_j_per_m2":0,"ir_j_per_m2":0.25}\n'
+    (sessions / ".darkbox" / "dose.jsonl").write_text(2 * line)
+    assert api.call("listDoses").json()["objects"] == [
+        {"object": "vase", "lux_s": 25, "uv_j_per_m2": 0, "ir_j_per_m2": 0.5}]
+    (sessions / ".darkbox" / "dose.jsonl").write_text("{}\n")
+    assert api.call("listDoses").status == 400
+
+
 def make_mistakes(api):
     assert api.call("enqueueJob", {"kind": "bake"}, check_body=False).status == 400
     assert api.call("enqueueJob", {"kind": "export", "session": "vase"}, check_body=False).status == 400
@@ -172,6 +182,7 @@ def main():
             check_document(api.document)
             look_into_files(api, drive_a_capture(api))
             work_the_queue(api)
+            tell_doses(api, pathlib.Path(folder) / "sessions")
             make_mistakes(api)
         finally:
             process.terminate()
