@@ -18,9 +18,9 @@ void InterlockedLamps::light(LampId lamp, double level) {
     lamps_.light(lamp, level);
 }
 
-void InterlockedLamps::arm(const std::vector<StrobeStep>& program) {
+void InterlockedLamps::arm(const std::vector<StrobeStep>& program, Nanoseconds exposed) {
     watch();
-    lamps_.strobed()->arm(program);
+    lamps_.strobed()->arm(program, exposed);
 }
 
 Frame InterlockedCamera::next_frame(TimePoint deadline) {

@@ -18,7 +18,7 @@ public:
     void dark() override { lamps_.dark(); }
     LampHealth health() override { return lamps_.health(); }
     StrobedLamps* strobed() override { return lamps_.strobed() ? this : nullptr; }
-    void arm(const std::vector<StrobeStep>& program) override;
+    void arm(const std::vector<StrobeStep>& program, Nanoseconds exposed) override;
     std::vector<StrobeEvent> take_events() override { return lamps_.strobed()->take_events(); }
     /// Darkens the lamps and throws DoorOpen when the door is open, or what keeps it from being told.
     void watch();
