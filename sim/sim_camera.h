@@ -21,7 +21,7 @@ struct SimCameraOptions {
     Seconds shortest_exposure{20e-6};
     Seconds longest_exposure{60};
     Seconds readout{0.004};  ///< from the end of the exposure to the finished frame
-    double room_light = 0;  ///< this share of every lamp's light is always there
+    double room_light = 0;   ///< this share of every lamp's light is always there
     FaultPlan faults;
 };
 

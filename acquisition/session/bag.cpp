@@ -55,8 +55,7 @@ std::string percent_decode(std::string_view text) {
 
 /// A value of bag-info.txt stays on its line.
 std::string one_line(std::string text) {
-    std::replace_if(
-        text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+    std::replace_if(text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
     return text;
 }
 

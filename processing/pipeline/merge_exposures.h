@@ -29,8 +29,8 @@ struct MergedRows {
 /// shot noise together, where the shot noise is that of the radiance merged so far and not that of each noisy sample
 /// itself (Granados et al., "Optimal HDR reconstruction with linear digital cameras", CVPR 2010, sections 3 and 4;
 /// Hasinoff et al., "Noise-optimal capture for high dynamic range photography", CVPR 2010, section 3). An exposure is
-/// left out where the shortest one predicts that it saturates: to judge by its own noisy sample would keep the dark half
-/// of them. `exposures` need not be sorted; at least one.
+/// left out where the shortest one predicts that it saturates: to judge by its own noisy sample would keep the dark
+/// half of them. `exposures` need not be sorted; at least one.
 MergedRows merge_exposures(const std::vector<ExposureRows>& exposures);
 
 }  // namespace darkbox

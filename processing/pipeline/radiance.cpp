@@ -166,10 +166,9 @@ FrameBands::FrameBands(const Session& session, const std::vector<FrameRecord>& p
         const cv::Size size = photos_.back()->size();
         if (photos_.size() == 1) size_ = size;
         if (size != size_)
-            throw InputError(
-                fmt::format("{} is {}x{} pixels but {} is {}x{}", photograph.file, size.width, size.height,
-                            photographs.front().file, size_.width, size_.height),
-                "give photographs of one camera in one place, all of one size");
+            throw InputError(fmt::format("{} is {}x{} pixels but {} is {}x{}", photograph.file, size.width, size.height,
+                                         photographs.front().file, size_.width, size_.height),
+                             "give photographs of one camera in one place, all of one size");
     }
 }
 

@@ -22,10 +22,11 @@ public:
     virtual void read_next(int rows, PhotoRows& photo) = 0;
 };
 
-/// Photographs of a session, captured or imported, read together from the top. They come as they were decoded, with what
-/// makes radiance of them: each frame's transfer curve, and what stood there without a lamp where the session has frames
-/// of that (see unlit_frames.h; they hold the black level already), else the black level. Several frames of one lamp are
-/// merged. 1.0 = full scale after the black level, of merged ones in the first frame's exposure. Thread-compatible.
+/// Photographs of a session, captured or imported, read together from the top. They come as they were decoded, with
+/// what makes radiance of them: each frame's transfer curve, and what stood there without a lamp where the session has
+/// frames of that (see unlit_frames.h; they hold the black level already), else the black level. Several frames of one
+/// lamp are merged. 1.0 = full scale after the black level, of merged ones in the first frame's exposure.
+/// Thread-compatible.
 class FrameBands {
 public:
     /// Opens every file. Throws InputError for one that cannot be read, or is of another size than the first.

@@ -64,9 +64,9 @@ void validate(const CapturePlan& plan, const RigDescription& rig, const LampArra
                          "begin with a dark frame: every other frame is compared with it");
     for (const std::span<const Shot> part : parts_of(plan))
         if (part.front().lamp)
-            throw InputError(
-                fmt::format("shot {} has an exposure or gain of its own, and no dark frame before it", part.front().name),
-                "begin every exposure with a dark frame: all others are compared with it");
+            throw InputError(fmt::format("shot {} has an exposure or gain of its own, and no dark frame before it",
+                                         part.front().name),
+                             "begin every exposure with a dark frame: all others are compared with it");
 }
 
 CaptureDescription limits_of(const RigDescription& rig) {
@@ -75,7 +75,8 @@ CaptureDescription limits_of(const RigDescription& rig) {
     return limits;
 }
 
-/// The part of a plan that is of one exposure; see run_capture(). The lamps go dark before the camera stops: a camera may hang while it does.
+/// The part of a plan that is of one exposure; see run_capture(). The lamps go dark before the camera stops: a camera
+/// may hang while it does.
 class Run {
 public:
     Run(std::span<const Shot> shots, const CapturePlan& plan, const RigDescription& rig, const CaptureDevices& devices,

@@ -100,7 +100,7 @@ private:
     std::optional<Frame> passed_over_;
     bool failed_ = false;
     int since_start_ = 0;  ///< frames taken in since the camera was started
-    Place last_;  ///< of the last frame since the camera was started
+    Place last_;           ///< of the last frame since the camera was started
     std::uint64_t lost_ = 0;
 };
 

@@ -62,7 +62,8 @@ private:
         return (lamp.max_on - lamp.settle) / 4;  // frames that are held back come before the one that counts
     }
 
-    /// The nearest exposure that camera, lamps and flicker allow, not longer than asked where it is a matter of flicker.
+    /// The nearest exposure that camera, lamps and flicker allow, not longer than asked where it is a matter of
+    /// flicker.
     Seconds allowed(Seconds wanted) const {
         const Seconds inside = std::clamp(wanted, shortest_, longest_);
         if (!rig_.flicker_hz) return inside;
@@ -167,7 +168,7 @@ private:
     Seconds longest_{std::numeric_limits<double>::infinity()};
     std::vector<bool> object_;
     bool object_is_sure_ = false;  ///< neither clipping nor noise blurred its edge
-    std::vector<double> levels_;  ///< of the lamps worth a look
+    std::vector<double> levels_;   ///< of the lamps worth a look
     Metering found_;
     int frames_ = 0;
 };
@@ -176,7 +177,8 @@ private:
 
 std::string Metering::words() const {
     return fmt::format(
-        "metered: exposure {:.3f} ms; under lamp '{}', its brightest, the object's 99.9th percentile is {:.1f} % of full "
+        "metered: exposure {:.3f} ms; under lamp '{}', its brightest, the object's 99.9th percentile is {:.1f} % of "
+        "full "
         "scale; {} frames taken for it, none kept",
         exposure.count() * 1000, lamp, level * 100, frames);
 }

@@ -7,8 +7,8 @@
 
 namespace darkbox {
 
-/// A frame's brightest channel at some pixels spread evenly over it (of a mosaic and of ycc8: its samples, its luma), as
-/// shares of full scale above the black level. The same pixels for all frames of one size.
+/// A frame's brightest channel at some pixels spread evenly over it (of a mosaic and of ycc8: its samples, its luma),
+/// as shares of full scale above the black level. The same pixels for all frames of one size.
 std::vector<float> metered_pixels(const Frame& frame);
 
 /// Which of these pixels show the object: those that are bright in the mean over all lamps (Otsu's threshold, "A

@@ -228,8 +228,7 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
         throw InputError("darkboxd has its rig already", "leave out --rig and --simulate, or add --standalone");
     if (a.plan == "recalibrate") return recalibrate(client, work);
     const fs::path folder = client.call("GET", "status").at("sessions").get<std::string>();
-    return capture_all(
-        a, folder, [&](const Arguments& one) { return capture_through(client, one, work); }, work);
+    return capture_all(a, folder, [&](const Arguments& one) { return capture_through(client, one, work); }, work);
 }
 
 }  // namespace

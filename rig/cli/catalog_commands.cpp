@@ -200,8 +200,7 @@ struct Added {
 Added add(CommandLine& line, const char* name, const char* description, const char* example, Run run,
           CLI::App* group = nullptr) {
     const auto a = std::make_shared<Arguments>();
-    CLI::App& command = line.add(
-        name, description, example, [a, run](const WorkContext&) { return run(*a); }, group);
+    CLI::App& command = line.add(name, description, example, [a, run](const WorkContext&) { return run(*a); }, group);
     command.add_option("--socket", a->socket, "Where darkboxd listens");
     return {command, a};
 }

@@ -46,11 +46,12 @@ CommandResult verify(const fs::path& folder) {
         const Referred referred = look_up(session, *old);
         result.json["retakes"] = {{"session", old->name}, {"found", referred.found}, {"unchanged", referred.unchanged}};
         result.text += fmt::format("; {} of them taken over from {}, which {}", referred.frames, old->name,
-                                   !referred.found        ? "is not beside it"
+                                   !referred.found       ? "is not beside it"
                                    : !referred.unchanged ? "is beside it, but holds something else by now"
                                                          : "is beside it as it was");
         if (referred.found && !referred.unchanged)
-            result.warnings.push_back(fmt::format("{} is not the session that {} refers to", old->name, folder.string()));
+            result.warnings.push_back(
+                fmt::format("{} is not the session that {} refers to", old->name, folder.string()));
     }
     return result;
 }

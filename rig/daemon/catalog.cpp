@@ -178,8 +178,7 @@ void compare_again(SQLite::Database& database, const fs::path& folder, const Ear
             database, "SELECT * FROM calibrations WHERE rig = ? ORDER BY created, session", read_calibration_row, rig);
         for (std::size_t i = 0; i < all.size(); ++i) {
             if (all[i].created < created) continue;
-            rows_of<int>(
-                database, "DELETE FROM drift WHERE session = ?", [](Statement&) { return 0; }, all[i].session);
+            rows_of<int>(database, "DELETE FROM drift WHERE session = ?", [](Statement&) { return 0; }, all[i].session);
             if (i == 0) continue;
             put_drift(database, compare_calibrations(folder, all[i - 1].session, all[i].session, "last"));
             put_drift(database, compare_calibrations(folder, all[0].session, all[i].session, "first"));

@@ -99,8 +99,7 @@ public:
           watchdog_(io_),
           leave_(io_),
           pruning_(io_),
-          server_(
-              io_, http, [this](const ApiRequest& request) { return api_->answer(request); }, log_, metrics_) {
+          server_(io_, http, [this](const ApiRequest& request) { return api_->answer(request); }, log_, metrics_) {
         fs::create_directories(sessions);
         ServiceOptions options{.sessions = sessions};
         options.bytes_needed = [this](const CaptureOrder& order) { return capture_bytes(rig_, order); };

@@ -60,7 +60,7 @@ std::string journal_name_of(const std::string& name) {
 /// Whether stderr is the stream that systemd connected to journald: "device:inode" (systemd.exec(5), $JOURNAL_STREAM).
 bool stderr_is_journal() {
     const char* stream = std::getenv("JOURNAL_STREAM");
-    struct stat there {};
+    struct stat there{};
     return stream != nullptr && ::fstat(STDERR_FILENO, &there) == 0 &&
            fmt::format("{}:{}", there.st_dev, there.st_ino) == stream;
 }

@@ -15,9 +15,10 @@ std::vector<double> read_brackets(TomlSection& section) {
     const std::vector<double> brackets = section.numbers_up_to("brackets", most_brackets);
     for (const double factor : brackets)
         if (!(factor >= 1 / widest_bracket && factor <= widest_bracket))
-            section.fail("brackets",
-                         fmt::format("brackets holds {}; allowed: {} to {}", factor, 1 / widest_bracket, widest_bracket),
-                         "give multiples of the exposure, such as [1, 0.25]");
+            section.fail(
+                "brackets",
+                fmt::format("brackets holds {}; allowed: {} to {}", factor, 1 / widest_bracket, widest_bracket),
+                "give multiples of the exposure, such as [1, 0.25]");
     std::vector<double> sorted = brackets;
     std::sort(sorted.begin(), sorted.end());
     if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end())

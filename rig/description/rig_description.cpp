@@ -219,8 +219,7 @@ void read_lamps(TomlSection& section, RigDescription& rig) {
             lamp.fail("name", fmt::format("is one of {} lamps; allowed: 1 to {}", lamps.size(), most_lamps),
                       "describe at most 64 lamps");
         rig.lamps.push_back(read_lamp(lamp, rig, active_low));
-        refuse_duplicate(
-            rig.lamps, [](const LampDescription& l) { return l.name; }, lamp, "name");
+        refuse_duplicate(rig.lamps, [](const LampDescription& l) { return l.name; }, lamp, "name");
         const std::string key = output_key(rig);
         const auto output = [&](const LampDescription& l) {
             return key == "line" ? l.line : std::to_string(key == "address" ? l.address : l.channel);

@@ -61,7 +61,9 @@ TEST_F(ObjectRecordTest, IsKeptWithTheSession) {
 TEST_F(ObjectRecordTest, IsKeptThroughAnInterruption) {
     SessionInfo info = capture_info(0);
     info.record = vase();
-    { const SessionWriter left = SessionWriter::create(folder_.path() / "s", info); }
+    {
+        const SessionWriter left = SessionWriter::create(folder_.path() / "s", info);
+    }
     EXPECT_EQ(SessionWriter::resume(folder_.path() / "s").seal().info().record, vase());
 }
 

@@ -48,10 +48,10 @@ TEST_F(CapturePlanTest, NamesAnUnknownLampAndTheKnownOnes) {
 TEST_F(CapturePlanTest, AveragesPassAfterPassWithDarkFramesBetween) {
     rig.capture.averages = 2;
     rig.capture.dark_every = 3;
-    EXPECT_THAT(names(plan_capture(rig)),
-                testing::ElementsAre("0000_dark", "0001_lamp-01", "0002_lamp-02", "0003_lamp-03", "0004_dark",
-                                     "0005_lamp-04", "0006_lamp-01", "0007_lamp-02", "0008_dark", "0009_lamp-03",
-                                     "0010_lamp-04", "0011_dark"));
+    EXPECT_THAT(
+        names(plan_capture(rig)),
+        testing::ElementsAre("0000_dark", "0001_lamp-01", "0002_lamp-02", "0003_lamp-03", "0004_dark", "0005_lamp-04",
+                             "0006_lamp-01", "0007_lamp-02", "0008_dark", "0009_lamp-03", "0010_lamp-04", "0011_dark"));
     rig.capture.dark_every = 8;
     EXPECT_EQ(plan_capture(rig).shots.size(), 10U) << "the closing dark frame is not taken twice";
 }
@@ -59,8 +59,8 @@ TEST_F(CapturePlanTest, AveragesPassAfterPassWithDarkFramesBetween) {
 TEST_F(CapturePlanTest, BracketsAreExposuresOneAfterTheOther) {
     rig.capture.brackets = {1, 0.25};
     const CapturePlan plan = plan_capture(rig, {"lamp-02"});
-    EXPECT_THAT(names(plan), testing::ElementsAre("0000_dark", "0001_lamp-02", "0002_dark", "0003_dark",
-                                                  "0004_lamp-02", "0005_dark"));
+    EXPECT_THAT(names(plan), testing::ElementsAre("0000_dark", "0001_lamp-02", "0002_dark", "0003_dark", "0004_lamp-02",
+                                                  "0005_dark"));
     EXPECT_EQ(plan.shots[2].camera.exposure, Seconds(0.02));
     EXPECT_EQ(plan.shots[3].camera.exposure, Seconds(0.005));
 }

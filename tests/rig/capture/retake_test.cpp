@@ -83,7 +83,8 @@ TEST_F(RetakeTest, TakesOneLampAgainAndTheRestOver) {
     EXPECT_EQ(session.info().object, "a cat");
     EXPECT_EQ(session.info().retakes, old_->reference());
     for (const FrameRecord& record : session.frames()) {
-        const bool fresh = record.file.find("lamp-02") != record.file.npos || record.file.find("-2.tif") != record.file.npos;
+        const bool fresh =
+            record.file.find("lamp-02") != record.file.npos || record.file.find("-2.tif") != record.file.npos;
         EXPECT_EQ(record.taken_over_from, fresh ? "" : "session") << record.file;
         if (!fresh) {
             EXPECT_EQ(record.sha256, frame_named(*old_, record.file).sha256);
@@ -168,7 +169,8 @@ TEST_F(RetakeTest, IsRefusedWhereALampHangsOnAnotherOutput) {
 }
 TEST_F(RetakeTest, IsRefusedForAnotherCamera) {
     bench_.camera.id = "0002";
-    EXPECT_THAT(refusal(request({"lamp-02"})), HasSubstr("captured with the camera fake (0001), and this is fake (0002)"));
+    EXPECT_THAT(refusal(request({"lamp-02"})),
+                HasSubstr("captured with the camera fake (0001), and this is fake (0002)"));
 }
 TEST_F(RetakeTest, IsRefusedInAnotherMode) {
     bench_.camera.black_level = 32;

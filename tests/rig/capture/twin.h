@@ -32,7 +32,8 @@ struct Twin {
         return capture_session(request, rig, sim().lamps(), sim().camera(), sim().clock());
     }
     Session capture(std::optional<ExposureChoice> exposure = {}) {
-        return capture({.folder = folder.path() / "session", .object = "a twin", .lamps = {}, .exposure = exposure}).session;
+        return capture({.folder = folder.path() / "session", .object = "a twin", .lamps = {}, .exposure = exposure})
+            .session;
     }
     Metering meter() {
         const CaptureDevices used = devices();

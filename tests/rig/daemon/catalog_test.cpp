@@ -100,7 +100,9 @@ TEST_F(CatalogTest, FindsWords) {
 
 TEST_F(CatalogTest, KnowsWhatLiesOnDisk) {
     seal("cup");
-    { const SessionWriter left = begin("vase", "2026-02-02T00:00:00.000Z"); }
+    {
+        const SessionWriter left = begin("vase", "2026-02-02T00:00:00.000Z");
+    }
     fs::create_directory(folder_.path() / "torn");
     std::ofstream(folder_.path() / "torn" / "journal.jsonl") << "nonsense\n";
     fs::create_directory(folder_.path() / "no-session");
@@ -214,7 +216,9 @@ TEST_F(CatalogTest, IsTheSameOnceRebuilt) {
 
 TEST_F(CatalogTest, IsMadeAnewWhereItIsDamaged) {
     seal("cup");
-    { Catalog(folder_.path()).refresh(); }
+    {
+        Catalog(folder_.path()).refresh();
+    }
     const fs::path file = folder_.path() / ".darkbox" / "catalog.sqlite";
     for (const std::string& damage : {std::string(100, 'x'), std::string(200'000, '\xa5')}) {
         std::ofstream(file, std::ios::in | std::ios::out) << damage;
@@ -227,7 +231,9 @@ TEST_F(CatalogTest, IsMadeAnewWhereItIsDamaged) {
 }
 
 TEST_F(CatalogTest, RefusesOneOfANewerDarkbox) {
-    { const Catalog made(folder_.path()); }
+    {
+        const Catalog made(folder_.path());
+    }
     const std::string file = folder_.path() / ".darkbox" / "catalog.sqlite";
     SQLite::Database(file, SQLite::OPEN_READWRITE).exec("PRAGMA user_version = 99");
     EXPECT_THROW(Catalog(folder_.path()), InputError);

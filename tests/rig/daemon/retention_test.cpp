@@ -163,7 +163,9 @@ TEST_F(RetentionTest, ACorruptedSessionStays) {
 TEST_F(RetentionTest, WhatIsNotProvenStays) {
     capture("doubtful", 1, false);
     capture("imported", 1, true, "import");
-    { const SessionWriter interrupted = begin("interrupted", 1); }
+    {
+        const SessionWriter interrupted = begin("interrupted", 1);
+    }
     capture("damaged", 1);
     replace_file(at("damaged") / "data/session.json", "{");
     const PruneReport report = prune({.keep_days = 7});

@@ -184,9 +184,8 @@ TEST_F(UsbLampsTest, ComeBackAfterTheFirmwareHung) {
 TEST_F(UsbLampsTest, AStallIsClearedAndTheCommandSaidAgain) {
     UsbLamps lamps(rig_of("LC-0001"));
     for (const std::uint16_t endpoint : {std::uint16_t{command_endpoint}, std::uint16_t{event_endpoint}}) {
-        bed->board(board).with_board([&](EmulatedBoard&, EmulatedHost& host) {
-            host.control({0x02, 3, 0, endpoint, 0});
-        });
+        bed->board(board).with_board(
+            [&](EmulatedBoard&, EmulatedHost& host) { host.control({0x02, 3, 0, endpoint, 0}); });
         lamps.light(LampId{3}, 1.0);
         EXPECT_EQ(lit(), bit(21));
         lamps.dark();
