@@ -12,8 +12,10 @@ namespace darkbox {
 namespace {
 
 /// The built-in rig of eight lamps; a fault of known size goes wrong in it.
-RigDescription twin(const std::string& faults, double exposure_ms = 20) {
+RigDescription twin(const std::string& faults, double exposure_ms = 20, int width = 160) {
     RigDescription rig = parse_rig(simulated_rig_toml(8), "twin");
+    rig.sim.width = width;
+    rig.sim.height = width * 3 / 4;
     rig.sim.faults = faults;
     rig.camera.exposure = Seconds(exposure_ms / 1000);
     return rig;
@@ -111,7 +113,7 @@ TEST(RigCheck, AcceptsWholePulses) {
 
 TEST(RigCheck, FindsALeakingLampAndHowMuch) {
     for (const double amount : {0.01, 0.03}) {
-        const RigReport report = checked(twin("leaking-lamp@0:2,6=" + std::to_string(amount))).report;
+        const RigReport report = checked(twin("leaking-lamp@0:2,6=" + std::to_string(amount), 20, 320)).report;
         expect_only(report, "leak");
         const RigFinding found = one_of(report, "leak");
         EXPECT_EQ(found.where, "lamp-07");
