@@ -85,9 +85,9 @@ void DosedLamps::arm(const std::vector<StrobeStep>& program, Nanoseconds exposed
 
 void DosedLamps::see_steps() {
     if (program_.empty()) return;
-    for (StrobeEvent& event : lamps_.strobed()->take_events()) {
+    for (const StrobeEvent& event : lamps_.strobed()->take_events()) {
         burn(event.step < program_.size() ? std::optional(program_[event.step]) : std::nullopt, event.moment.begin);
-        events_.push_back(std::move(event));
+        events_.push_back(event);
     }
 }
 
