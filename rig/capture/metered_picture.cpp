@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
+
+#include "rig/capture/picture.h"
 
 namespace darkbox {
 namespace {
@@ -11,39 +12,19 @@ namespace {
 constexpr std::size_t most_pixels = 200'000;
 constexpr double share_below = 0.999;
 
-/// One channel of ycc8 says how much light there was; a mosaic's samples are pixels of their own.
-struct Layout {
-    std::size_t step = 1;      ///< samples from pixel to pixel
-    std::size_t channels = 1;  ///< of which the brightest counts
-};
-
-Layout layout_of(PixelFormat format) {
-    if (format == PixelFormat::ycc8) return {2, 1};
-    const auto all = static_cast<std::size_t>(channels(format));
-    return {all, all};
-}
-
-double sample_at(const Frame& frame, std::size_t index) {
-    if (bytes_per_sample(frame.format) == 1) return std::to_integer<int>(frame.pixels[index]);
-    std::uint16_t sample = 0;
-    std::memcpy(&sample, frame.pixels.data() + 2 * index, sizeof sample);
-    return sample;
-}
-
 }  // namespace
 
 std::vector<float> metered_pixels(const Frame& frame) {
-    const Layout layout = layout_of(frame.format);
+    const Picture picture = to_picture(frame);
     const std::size_t count = static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height);
     const std::size_t every = (count + most_pixels - 1) / most_pixels | 1U;  // odd: all places of a mosaic come
+    const auto colours = static_cast<std::ptrdiff_t>(picture.columns / frame.width);
     const double scale = 1 / (std::exp2(frame.bit_depth) - 1 - frame.black_level);
     std::vector<float> pixels;
     pixels.reserve(count / every + 1);
     for (std::size_t pixel = 0; pixel < count; pixel += every) {
-        double most = 0;
-        for (std::size_t channel = 0; channel < layout.channels; ++channel)
-            most = std::max(most, sample_at(frame, pixel * layout.step + channel));
-        pixels.push_back(static_cast<float>((most - frame.black_level) * scale));
+        const auto first = picture.samples.begin() + static_cast<std::ptrdiff_t>(pixel) * colours;
+        pixels.push_back(static_cast<float>((*std::max_element(first, first + colours) - frame.black_level) * scale));
     }
     return pixels;
 }
