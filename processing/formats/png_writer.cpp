@@ -98,7 +98,7 @@ void encode(cv::Size size, int type, const FillPngRow& fill, const Sink& sink) {
                      "report this as a bug");
 }
 
-FillPngRow rows_of(const cv::Mat& image) {
+FillPngRow filled_from(const cv::Mat& image) {
     return [&image](int row, uchar* samples) {
         std::memcpy(samples, image.ptr(row), static_cast<std::size_t>(image.cols) * image.elemSize());
     };
@@ -108,7 +108,7 @@ FillPngRow rows_of(const cv::Mat& image) {
 
 std::vector<std::byte> encode_png(const cv::Mat& image) {
     std::vector<std::byte> png;
-    encode(image.size(), image.type(), rows_of(image),
+    encode(image.size(), image.type(), filled_from(image),
            [&](std::span<const std::byte> bytes) { png.insert(png.end(), bytes.begin(), bytes.end()); });
     return png;
 }
@@ -120,7 +120,7 @@ void write_png_rows(const std::filesystem::path& path, cv::Size size, int type, 
 }
 
 void write_png(const std::filesystem::path& path, const cv::Mat& image) {
-    write_png_rows(path, image.size(), image.type(), rows_of(image));
+    write_png_rows(path, image.size(), image.type(), filled_from(image));
 }
 
 }  // namespace darkbox

@@ -215,10 +215,6 @@ std::optional<GreyCard> card_of(const CalibrateOptions& options) {
     return card;
 }
 
-void append(std::vector<std::string>& to, std::vector<std::string> more) {
-    to.insert(to.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
-}
-
 void warn_of_few_lights(Calibration& calibration) {
     const auto used =
         std::count_if(calibration.lights.begin(), calibration.lights.end(), [](const Light& l) { return l.used; });

@@ -7,8 +7,8 @@
 namespace darkbox {
 namespace {
 
-constexpr double black_share = 0.01;   // of the typical photograph's brightness: noise, no lamp
-constexpr double clipped_share = 0.5;  // of the object
+constexpr double black_share = 0.01;          // of the typical photograph's brightness: noise, no lamp
+constexpr double clipped_object_share = 0.5;  // of the object
 constexpr double overexposed_share = 0.01;
 constexpr int fewest_samples = 3;
 
@@ -64,7 +64,7 @@ std::vector<std::string> FrameTally::warnings(const Lights& lights) const {
     const auto all = static_cast<double>(pixels_);
     for (std::size_t i = 0; i < frames_.size(); ++i) {
         const double clipped = static_cast<double>(frames_[i].clipped) / all;
-        if (lights[i].used && clipped > clipped_share)
+        if (lights[i].used && clipped > clipped_object_share)
             warnings.push_back(
                 fmt::format("{0} is clipped on {1:.0f} % of the object: expose less, or leave it out "
                             "with: darkbox calibrate SESSION --drop {0}",

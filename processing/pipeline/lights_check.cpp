@@ -16,8 +16,8 @@ constexpr std::size_t most_values = 600'000;  // pixels times lights
 constexpr std::size_t fewest_pixels = 100;
 constexpr Eigen::Index fewest_lights = 5;  // four leave one number of each pixel unexplained: chance decides
 constexpr int orders = 101;
-constexpr double no_better = 0.6;        // of what a shuffled order adds to the least possible
-constexpr double least_residual = 0.05;  // below it no order is far off
+constexpr double no_better = 0.6;             // of what a shuffled order adds to the least possible
+constexpr double least_mean_residual = 0.05;  // below it no order is far off
 
 std::vector<std::size_t> used_images(const Lights& lights) {
     std::vector<std::size_t> used;
@@ -100,7 +100,7 @@ std::optional<LightsFit> lights_fit(const PhotoStack& stack, const Lights& light
 
 std::optional<std::string> lights_warning(const PhotoStack& stack, const Lights& lights) {
     const auto fit = lights_fit(stack, lights);
-    if (!fit || !(fit->given > least_residual && fit->excess() > no_better)) return std::nullopt;
+    if (!fit || !(fit->given > least_mean_residual && fit->excess() > no_better)) return std::nullopt;
     return fmt::format(
         "the lights contradict the photographs: {:.0f} % of the radiance is left unexplained, about {:.0f} % would be "
         "with the same lights in any order, and {:.0f} % could be with the right ones: check that directions and "

@@ -35,10 +35,6 @@ namespace fs = std::filesystem;
 
 constexpr int near_light_passes = 2;  ///< more change nothing that can be seen
 
-void append(std::vector<std::string>& to, std::vector<std::string> more) {
-    to.insert(to.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
-}
-
 /// Truth of another size, or of nothing that was solved, is for evaluate to refuse: the normals are good without it.
 std::optional<double> error_against_truth(const Session& session, const NormalMap& normals) {
     const auto file = extra_of(session, given_truth);

@@ -2,7 +2,9 @@
 
 #include <chrono>
 #include <cstddef>
+#include <iterator>
 #include <string>
+#include <vector>
 
 #include "acquisition/frame/progress.h"
 
@@ -19,5 +21,9 @@ public:
 private:
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
+
+inline void append(std::vector<std::string>& to, std::vector<std::string> more) {
+    to.insert(to.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
+}
 
 }  // namespace darkbox

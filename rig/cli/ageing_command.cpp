@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct AgeingArguments {
     fs::path folder;
     std::string rig;
     fs::path picture;
@@ -35,7 +35,7 @@ std::optional<double> day_of(const std::string& when) {
     return static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count());
 }
 
-std::vector<DatedLights> history_of(const Arguments& a, const fs::path& folder) {
+std::vector<DatedLights> history_of(const AgeingArguments& a, const fs::path& folder) {
     Catalog catalog(folder, Catalog::Place::in_memory);
     catalog.refresh();
     std::vector<DatedLights> history;
@@ -50,7 +50,7 @@ std::vector<DatedLights> history_of(const Arguments& a, const fs::path& folder) 
     return history;
 }
 
-CommandResult ageing(const Arguments& a) {
+CommandResult ageing(const AgeingArguments& a) {
     const fs::path folder = a.folder.empty() ? default_sessions_folder() : a.folder;
     const auto lamps = lamp_ageing(history_of(a, folder));
     if (lamps.empty())
@@ -77,7 +77,7 @@ CommandResult ageing(const Arguments& a) {
 }  // namespace
 
 void add_ageing_command(CommandLine& line) {
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<AgeingArguments>();
     CLI::App& command = line.add("ageing", "How the lamps of a rig lose light over months, from its calibrations",
                                  "darkbox ageing --picture ageing.svg --table ageing.csv",
                                  [a](const WorkContext&) { return ageing(*a); });

@@ -23,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 using EventJson = DaemonClient::Json;
 
-struct Arguments {
+struct CaptureArguments {
     fs::path rig;
     int simulate = 0;  ///< lamps of the built-in simulated rig; 0 = not asked for
     std::string object;
@@ -66,7 +66,7 @@ CommandResult captured(const std::string& folder, std::size_t frames, int repeat
 // In this process.
 
 /// A session is resumed, or taken again in parts, with the rig it was begun with, unless another is named.
-RigDescription rig_for(const Arguments& a, const CaptureRequest& request) {
+RigDescription rig_for(const CaptureArguments& a, const CaptureRequest& request) {
     if (!a.rig.empty()) return load_rig(a.rig);
     if (a.simulate > 0) return parse_rig(simulated_rig_toml(a.simulate), "built-in simulated rig");
     const fs::path kept = request.folder / "data" / "rig.toml";
@@ -76,7 +76,7 @@ RigDescription rig_for(const Arguments& a, const CaptureRequest& request) {
     throw InputError("no rig is given", "give --rig rig.toml, or --simulate 12 for a simulated rig");
 }
 
-CaptureRequest request_for(const Arguments& a) {
+CaptureRequest request_for(const CaptureArguments& a) {
     CaptureRequest request{
         .folder = a.out, .object = a.object, .lamps = lamps_of_plan(a.plan), .mode = sync_mode_from_name(a.mode)};
     request.exposure = exposure_of(a.exposure);
@@ -102,7 +102,7 @@ std::string way_on(const fs::path& session, const std::string& remedy) {
                        remedy.empty() ? "" : remedy + "; then ", session.string());
 }
 
-CommandResult capture_here(const Arguments& a, const WorkContext& work) {
+CommandResult capture_here(const CaptureArguments& a, const WorkContext& work) {
     const CaptureRequest request = request_for(a);
     const RigDescription description = rig_for(a, request);
     Hardware hardware(description);
@@ -127,7 +127,7 @@ std::string resume_after(const EventJson& job) {
     return fmt::format("start it again, then: darkbox capture --resume {}", job.at("session").get<std::string>());
 }
 
-CaptureOrder order_for(const Arguments& a, const DaemonClient& client) {
+CaptureOrder order_for(const CaptureArguments& a, const DaemonClient& client) {
     CaptureOrder order{.object = a.object, .lamps = lamps_of_plan(a.plan), .mode = sync_mode_from_name(a.mode)};
     order.exposure = exposure_of(a.exposure);
     order.record = object_record(a.about);
@@ -146,7 +146,7 @@ CaptureOrder order_for(const Arguments& a, const DaemonClient& client) {
     throw DeviceError(what, hint);
 }
 
-CommandResult capture_through(const DaemonClient& client, const Arguments& a, const WorkContext& work) {
+CommandResult capture_through(const DaemonClient& client, const CaptureArguments& a, const WorkContext& work) {
     const EventJson job = client.call("POST", "captures", to_json(order_for(a, client)));
     const EventJson end = FollowedJob(client, job, work, resume_after(job)).end();
     if (end.at("event") == "done")
@@ -187,7 +187,8 @@ CommandResult recalibrate(const DaemonClient& client, const WorkContext& work) {
 
 /// One capture, or as many as were asked for.
 template <class Capture>
-CommandResult capture_all(const Arguments& a, const fs::path& sessions, Capture capture, const WorkContext& work) {
+CommandResult capture_all(const CaptureArguments& a, const fs::path& sessions, Capture capture,
+                          const WorkContext& work) {
     if (a.repeat == 1) return capture(a);
     CaptureSeries series{.object = a.object};
     if (!a.between.empty()) series.between = Hook{split_words(a.between), std::chrono::seconds(a.between_timeout_s)};
@@ -195,14 +196,14 @@ CommandResult capture_all(const Arguments& a, const fs::path& sessions, Capture 
     fs::path base = a.out;
     if (base.empty()) base = sessions / fresh_session_name(sessions, a.object, std::chrono::system_clock::now());
     const auto into = [&](const fs::path& session) {
-        Arguments one = a;
+        CaptureArguments one = a;
         one.out = session;
         return capture(one);
     };
     return capture_series(series, numbered_names(base, a.repeat), into, work);
 }
 
-CommandResult run(const Arguments& a, const WorkContext& work) {
+CommandResult run(const CaptureArguments& a, const WorkContext& work) {
     if (!a.resume.empty() && !(a.out.empty() && a.object.empty() && a.about.empty()))
         throw InputError("a resumed session keeps its name and its object",
                          "leave out --out, --object, --inventory and --meta");
@@ -219,7 +220,7 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
         throw InputError("--repeat makes new sessions", "leave out --resume, --retake and --plan recalibrate");
     if (a.standalone)
         return capture_all(
-            a, default_sessions_folder(), [&](const Arguments& one) { return capture_here(one, work); }, work);
+            a, default_sessions_folder(), [&](const CaptureArguments& one) { return capture_here(one, work); }, work);
     const DaemonClient client(a.socket.empty() ? default_socket() : a.socket);
     if (!client.answers())
         throw InputError(fmt::format("no darkboxd answers at {}", client.socket().string()),
@@ -228,7 +229,8 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
         throw InputError("darkboxd has its rig already", "leave out --rig and --simulate, or add --standalone");
     if (a.plan == "recalibrate") return recalibrate(client, work);
     const fs::path folder = client.call("GET", "status").at("sessions").get<std::string>();
-    return capture_all(a, folder, [&](const Arguments& one) { return capture_through(client, one, work); }, work);
+    return capture_all(
+        a, folder, [&](const CaptureArguments& one) { return capture_through(client, one, work); }, work);
 }
 
 }  // namespace
@@ -256,7 +258,7 @@ std::string name_in_folder(const fs::path& session, const fs::path& folder) {
 }
 
 void add_capture_command(CommandLine& line) {
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<CaptureArguments>();
     CLI::App& command =
         line.add("capture", "Capture an object lamp by lamp, through darkboxd or in this process",
                  "darkbox capture --object vase --inventory 1907.12 --meta title=\"A vase\" --meta creator=\"A "

@@ -3,9 +3,9 @@
 #include <memory>
 #include <optional>
 
+#include "rig/cli/daemon_questions.h"
 #include "rig/cli/rig_commands.h"
 #include "rig/daemon/api_words.h"
-#include "rig/daemon/client.h"
 #include "rig/daemon/folder_lock.h"
 
 namespace darkbox {
@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t everything = 1'000'000;
 
-struct Arguments {
+struct CatalogArguments {
     fs::path socket;
     fs::path folder;
     bool rebuild = false;
@@ -24,13 +24,6 @@ struct Arguments {
 };
 
 std::string text(const Json& json, const char* key) { return json.value(key, std::string()); }
-
-DaemonClient client_for(const Arguments& a) { return DaemonClient(a.socket.empty() ? default_socket() : a.socket); }
-
-/// The daemon's answer, in the order in which Json prints.
-Json ask(const DaemonClient& client, const std::string& method, const std::string& target) {
-    return Json::parse(client.call(method, target).dump());
-}
 
 /// For the value of a query (RFC 3986, section 2.3).
 std::string percent_encoded(const std::string& text) {
@@ -55,14 +48,14 @@ Json ask_for_all(const DaemonClient& client, const std::string& list, const std:
 }
 
 /// The daemon to ask: none when a folder is named, or none answers.
-std::optional<DaemonClient> daemon_of(const Arguments& a) {
+std::optional<DaemonClient> daemon_of(const CatalogArguments& a) {
     if (!a.folder.empty()) return std::nullopt;
     const auto socket = a.socket.empty() ? known_socket() : std::optional(a.socket);
     if (!socket || !DaemonClient(*socket).answers()) return std::nullopt;
     return DaemonClient(*socket);
 }
 
-fs::path folder_of(const Arguments& a) { return a.folder.empty() ? default_sessions_folder() : a.folder; }
+fs::path folder_of(const CatalogArguments& a) { return a.folder.empty() ? default_sessions_folder() : a.folder; }
 
 Json describe(const SessionListing& session) {
     Json json{{"name", session.name},       {"state", name(session.state)}, {"object", session.object},
@@ -83,7 +76,7 @@ Json sessions_on_disk(const fs::path& folder, const std::string& find) {
     return {{"folder", folder.string()}, {"sessions", list}};
 }
 
-CommandResult rebuild(const Arguments& a) {
+CommandResult rebuild(const CatalogArguments& a) {
     CommandResult result;
     if (const auto client = daemon_of(a)) {
         result.json = ask(*client, "POST", "catalog/rebuild");
@@ -100,7 +93,7 @@ CommandResult rebuild(const Arguments& a) {
     return result;
 }
 
-CommandResult sessions(const Arguments& a) {
+CommandResult sessions(const CatalogArguments& a) {
     if (a.rebuild) return rebuild(a);
     CommandResult result;
     const auto client = daemon_of(a);
@@ -150,7 +143,7 @@ std::string since(const Json& calibration, const std::string& role, std::vector<
     return "-";
 }
 
-CommandResult calibrations(const Arguments& a) {
+CommandResult calibrations(const CatalogArguments& a) {
     CommandResult result;
     const auto client = daemon_of(a);
     result.json = client ? ask_for_all(*client, "calibrations") : calibrations_on_disk(folder_of(a));
@@ -168,9 +161,9 @@ CommandResult calibrations(const Arguments& a) {
     return result;
 }
 
-CommandResult jobs(const Arguments& a) {
+CommandResult jobs(const CatalogArguments& a) {
     CommandResult result;
-    result.json = ask(client_for(a), "GET", "jobs");
+    result.json = ask(client_at(a.socket), "GET", "jobs");
     for (const Json& job : result.json.at("jobs")) {
         const Json& progress = job.at("progress");
         result.text +=
@@ -183,29 +176,29 @@ CommandResult jobs(const Arguments& a) {
     return result;
 }
 
-CommandResult cancel_job(const Arguments& a) {
+CommandResult cancel_job(const CatalogArguments& a) {
     CommandResult result;
-    result.json = ask(client_for(a), "DELETE", fmt::format("jobs/{}", a.id));
+    result.json = ask(client_at(a.socket), "DELETE", fmt::format("jobs/{}", a.id));
     result.text = fmt::format("job {} is {}", a.id, text(result.json, "state"));
     return result;
 }
 
-using Run = CommandResult (*)(const Arguments&);
+using CatalogRun = CommandResult (*)(const CatalogArguments&);
 
-struct Added {
+struct CatalogCommand {
     CLI::App& command;
-    std::shared_ptr<Arguments> arguments;
+    std::shared_ptr<CatalogArguments> arguments;
 };
 
-Added add(CommandLine& line, const char* name, const char* description, const char* example, Run run,
-          CLI::App* group = nullptr) {
-    const auto a = std::make_shared<Arguments>();
+CatalogCommand add_catalog_command(CommandLine& line, const char* name, const char* description, const char* example,
+                                   CatalogRun run, CLI::App* group = nullptr) {
+    const auto a = std::make_shared<CatalogArguments>();
     CLI::App& command = line.add(name, description, example, [a, run](const WorkContext&) { return run(*a); }, group);
     command.add_option("--socket", a->socket, "Where darkboxd listens");
     return {command, a};
 }
 
-void take_folder(const Added& added) {
+void take_folder(const CatalogCommand& added) {
     added.command.add_option(
         "--folder", added.arguments->folder,
         "Where the sessions lie; default: darkboxd's folder when it runs, else $DARKBOX_SESSIONS, or ./sessions");
@@ -214,19 +207,21 @@ void take_folder(const Added& added) {
 }  // namespace
 
 void add_catalog_commands(CommandLine& line) {
-    const Added list =
-        add(line, "sessions", "The captured sessions", "darkbox sessions --find \"vase 1907\"", sessions);
+    const CatalogCommand list = add_catalog_command(line, "sessions", "The captured sessions",
+                                                    "darkbox sessions --find \"vase 1907\"", sessions);
     take_folder(list);
     list.command.add_option("--find", list.arguments->find,
                             "Only sessions with all of these words in name, object, inventory number or Dublin Core");
     list.command.add_flag("--rebuild", list.arguments->rebuild, "Make the catalogue again from what is on disk");
     add_prune_command(line, list.command);
-    take_folder(add(line, "calibrations", "Every calibration, and what moved since the last and the first one",
-                    "darkbox calibrations", calibrations));
+    take_folder(add_catalog_command(line, "calibrations",
+                                    "Every calibration, and what moved since the last and the first one",
+                                    "darkbox calibrations", calibrations));
 
     CLI::App& group = line.add_group("jobs", "What darkboxd was asked to do");
-    add(line, "list", "The last hundred, newest first", "darkbox jobs list", jobs, &group);
-    const Added cancel = add(line, "cancel", "Ask a job to stop", "darkbox jobs cancel 12", cancel_job, &group);
+    add_catalog_command(line, "list", "The last hundred, newest first", "darkbox jobs list", jobs, &group);
+    const CatalogCommand cancel =
+        add_catalog_command(line, "cancel", "Ask a job to stop", "darkbox jobs cancel 12", cancel_job, &group);
     cancel.command.add_option("id", cancel.arguments->id, "The job's number")->required();
 }
 

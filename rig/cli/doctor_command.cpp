@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct DoctorArguments {
     fs::path rig = "/etc/darkbox/rig.toml";
     fs::path sessions;
 };
@@ -37,7 +37,7 @@ Diagnosis diagnose_daemon() {
             "sudo systemctl start darkboxd (journalctl -u darkboxd says why it ended), or darkboxd --config rig.toml"};
 }
 
-Diagnoses diagnose(const Arguments& a) {
+Diagnoses diagnose(const DoctorArguments& a) {
     Diagnoses all;
     const auto take = [&all](Diagnoses more) { all.insert(all.end(), more.begin(), more.end()); };
     try {
@@ -59,7 +59,7 @@ Diagnoses diagnose(const Arguments& a) {
     return all;
 }
 
-CommandResult doctor(const Arguments& a) {
+CommandResult doctor(const DoctorArguments& a) {
     CommandResult result;
     result.json["checks"] = Json::array();
     std::size_t bad = 0;
@@ -79,7 +79,7 @@ CommandResult doctor(const Arguments& a) {
 }  // namespace
 
 void add_doctor_command(CommandLine& line) {
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<DoctorArguments>();
     CLI::App& command = line.add("doctor", "Check this machine for what a rig needs, and say what to do",
                                  "darkbox doctor --rig rig.toml", [a](const WorkContext&) { return doctor(*a); });
     command.add_option("--rig", a->rig, "The rig's description")->capture_default_str();

@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct DriftArguments {
     fs::path before;
     fs::path after;
     DriftOptions options;
@@ -66,7 +66,7 @@ std::string in_text(const Drift& drift) {
 }  // namespace
 
 void add_drift_command(CommandLine& line) {
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<DriftArguments>();
     CLI::App& command = line.add("drift", "What moved between two calibrations of one rig",
                                  "darkbox drift sessions/march sessions/may", [a](const WorkContext&) {
                                      const Drift drift = drift_between(read_rig_lights(a->before),

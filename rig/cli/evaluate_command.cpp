@@ -186,7 +186,7 @@ std::string describe(const Evaluation& evaluation, const EvaluateOptions& option
     return text;
 }
 
-struct Arguments {
+struct EvaluateArguments {
     fs::path session;
     EvaluateOptions options;
     fs::path lights;
@@ -194,7 +194,7 @@ struct Arguments {
     bool no_held_out = false;
 };
 
-CommandResult evaluate(const Arguments& arguments, const WorkContext& work) {
+CommandResult evaluate(const EvaluateArguments& arguments, const WorkContext& work) {
     EvaluateOptions options = arguments.options;
     if (!arguments.lights.empty()) options.reference_lights = arguments.lights;
     if (arguments.ideal_sphere) options.truth = NormalTruth::ideal_sphere;
@@ -211,7 +211,7 @@ CommandResult evaluate(const Arguments& arguments, const WorkContext& work) {
 }  // namespace
 
 void add_evaluate_command(CommandLine& line) {
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<EvaluateArguments>();
     CLI::App& command =
         line.add("evaluate", "Predict each photograph without it; errors against the truth where it is known",
                  "darkbox evaluate s --solver lsq", [a](const WorkContext& work) { return evaluate(*a, work); });

@@ -17,7 +17,7 @@
 namespace darkbox {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using HookClock = std::chrono::steady_clock;
 
 constexpr auto poll_every = std::chrono::milliseconds(20);
 constexpr auto patience = std::chrono::seconds(2);  ///< between asking it to end and killing it
@@ -91,9 +91,9 @@ std::optional<int> ended(pid_t child) {
 
 void end_group(pid_t child) {
     ::kill(-child, SIGTERM);
-    const auto until = Clock::now() + patience;
+    const auto until = HookClock::now() + patience;
     bool reaped = false;
-    while (!reaped && Clock::now() < until) {
+    while (!reaped && HookClock::now() < until) {
         reaped = ended(child).has_value();
         std::this_thread::sleep_for(poll_every);
     }
@@ -141,14 +141,14 @@ std::vector<std::string> split_words(const std::string& command) {
 void run_hook(const Hook& hook, const std::map<std::string, std::string>& environment, const std::stop_token& stop) {
     const std::string& command = hook.words.front();
     const pid_t child = Spawning().spawn(hook.words, environment_with(environment));
-    const auto deadline = Clock::now() + hook.deadline;
+    const auto deadline = HookClock::now() + hook.deadline;
     while (true) {
         if (const auto status = ended(child)) return require_success(command, *status);
         if (stop.stop_requested()) {
             end_group(child);
             throw Cancelled(fmt::format("the hook {} was stopped", command), "the captures so far are kept");
         }
-        if (Clock::now() >= deadline) {
+        if (HookClock::now() >= deadline) {
             end_group(child);
             throw DeviceError(
                 fmt::format("the hook {} was not done after {} s and was ended", command, hook.deadline.count()),

@@ -13,13 +13,13 @@ namespace {
 
 constexpr std::string_view warning_prefix = "warning: ";
 
-struct Arguments {
+struct ImportArguments {
     ImportOptions options;
     std::vector<std::string> balls;
     ObjectOptions object;
 };
 
-CommandResult run(const Arguments& arguments, const WorkContext& work) {
+CommandResult run(const ImportArguments& arguments, const WorkContext& work) {
     ImportOptions options = arguments.options;
     for (const std::string& text : arguments.balls) options.balls.push_back(parse_ball(text));
     options.record = object_record(arguments.object);
@@ -45,7 +45,7 @@ CommandResult run(const Arguments& arguments, const WorkContext& work) {
 }  // namespace
 
 void add_import_command(CommandLine& line) {
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<ImportArguments>();
     CLI::App& command =
         line.add("import", "Make a sealed session of photographs from any camera",
                  "darkbox import photos --ball-images ball --mask photos/mask.png --transfer linear --out s",

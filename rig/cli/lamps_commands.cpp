@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct LampsArguments {
     fs::path rig;
     fs::path socket;
     std::string lamp;
@@ -27,14 +27,14 @@ struct Arguments {
 };
 
 /// The darkboxd that runs, if one does: the lamps are its own then.
-std::optional<DaemonClient> running_daemon(const Arguments& a) {
+std::optional<DaemonClient> running_daemon(const LampsArguments& a) {
     const auto socket = a.socket.empty() ? known_socket() : std::optional(a.socket);
     if (!socket) return std::nullopt;
     DaemonClient client(*socket);
     return client.answers() ? std::optional(std::move(client)) : std::nullopt;
 }
 
-RigDescription rig_of(const Arguments& a) {
+RigDescription rig_of(const LampsArguments& a) {
     if (a.rig.empty())
         throw InputError("no darkboxd answers, and no rig is given",
                          "start it (darkboxd --config rig.toml), or add --rig rig.toml");
@@ -61,7 +61,7 @@ CommandResult list_boards() {
     return result;
 }
 
-CommandResult list(const Arguments& a) {
+CommandResult list(const LampsArguments& a) {
     if (a.boards) return list_boards();
     CommandResult result;
     const auto daemon = a.rig.empty() ? running_daemon(a) : std::nullopt;
@@ -96,7 +96,7 @@ CommandResult darken_through(const DaemonClient& client) {
     return all_dark(told.at("detail"));
 }
 
-CommandResult dark(const Arguments& a, const WorkContext&) {
+CommandResult dark(const LampsArguments& a, const WorkContext&) {
     if (const auto daemon = running_daemon(a)) return darken_through(*daemon);
     Hardware hardware(rig_of(a));
     hardware.open_lamps()->dark();
@@ -119,7 +119,7 @@ void wait(Seconds time, const WorkContext& work) {
     while (!work.cancelled() && clock.now() < end) clock.sleep_until(std::min(end, clock.now() + step));
 }
 
-CommandResult on(const Arguments& a, const WorkContext& work) {
+CommandResult on(const LampsArguments& a, const WorkContext& work) {
     if (running_daemon(a))
         throw InputError("darkboxd runs, and the lamps are its own", "stop it to light a lamp by hand");
     const RigDescription rig = rig_of(a);
@@ -146,15 +146,15 @@ CommandResult on(const Arguments& a, const WorkContext& work) {
 void add_lamps_commands(CommandLine& line) {
     CLI::App& group = line.add_group("lamps", "The lamps of the rig");
     const auto add = [&](const char* name, const char* description, const char* example, auto body) -> auto {
-        const auto a = std::make_shared<Arguments>();
+        const auto a = std::make_shared<LampsArguments>();
         CLI::App& command =
             line.add(name, description, example, [a, body](const WorkContext& work) { return body(*a, work); }, &group);
         command.add_option("--socket", a->socket, "Where darkboxd listens");
         command.add_option("--rig", a->rig, "The rig's description, where no darkboxd runs");
-        return std::pair<CLI::App*, std::shared_ptr<Arguments>>(&command, a);
+        return std::pair<CLI::App*, std::shared_ptr<LampsArguments>>(&command, a);
     };
     const auto [lister, listed] = add("list", "Names and places of the lamps", "darkbox lamps list",
-                                      [](const Arguments& a, const WorkContext&) { return list(a); });
+                                      [](const LampsArguments& a, const WorkContext&) { return list(a); });
     lister->add_flag("--boards", listed->boards, "The USB lamp controllers that are plugged in, instead");
     add_lamps_flash_command(line, group);
     add("dark", "Darken every lamp; a running capture is cancelled", "darkbox lamps dark", dark);

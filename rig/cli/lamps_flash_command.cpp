@@ -23,7 +23,7 @@ using namespace lamp_protocol;
 
 constexpr auto restart_patience = std::chrono::seconds(15);
 
-struct Arguments {
+struct FlashArguments {
     fs::path image;
     std::string serial;
     std::string label;
@@ -52,7 +52,7 @@ int run(const std::vector<std::string>& arguments) {
     return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
 }
 
-void program(const Arguments& a) {
+void program(const FlashArguments& a) {
     std::vector<std::vector<std::string>> steps;
     if (a.programmer == "avrdude")
         steps = {{"avrdude", "-c", "flip1", "-p", "m32u4", "-U", "flash:w:" + a.image.string() + ":i"}};
@@ -66,7 +66,7 @@ void program(const Arguments& a) {
                               "press the board's bootloader button while you plug it in, and try again");
 }
 
-Identity wanted_identity(const Arguments& a) {
+Identity wanted_identity(const FlashArguments& a) {
     Identity identity{};
     identity.layout = identity_layout;
     identity.lamps = static_cast<std::uint8_t>(a.lamps);
@@ -84,7 +84,7 @@ Identity wanted_identity(const Arguments& a) {
 }
 
 /// Leaves the board in its bootloader. None answers when the chip is new, or already there.
-bool enter_bootloader(const Arguments& a, const ImageMark& mark) {
+bool enter_bootloader(const FlashArguments& a, const ImageMark& mark) {
     const auto boards = UsbBus().boards();
     if (boards.empty()) return false;
     LampControllerOptions options;
@@ -102,7 +102,7 @@ bool enter_bootloader(const Arguments& a, const ImageMark& mark) {
 }
 
 /// Waits for the flashed board; gives it an identity if it has none.
-CommandResult check_flashed(const Arguments& a, const ImageMark& mark) {
+CommandResult check_flashed(const FlashArguments& a, const ImageMark& mark) {
     UsbBus bus;
     bus.open_within("", restart_patience);
     LampControllerOptions options;
@@ -132,7 +132,7 @@ CommandResult check_flashed(const Arguments& a, const ImageMark& mark) {
     return result;
 }
 
-CommandResult flash(const Arguments& a) {
+CommandResult flash(const FlashArguments& a) {
     const LampImage image = read_lamp_image(a.image);
     if (UsbBus().boards().size() > 1)
         throw InputError("several lamp controllers are plugged in, and the chip's loader has no name",
@@ -146,7 +146,7 @@ CommandResult flash(const Arguments& a) {
 }  // namespace
 
 void add_lamps_flash_command(CommandLine& line, CLI::App& group) {
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<FlashArguments>();
     CLI::App& command = line.add(
         "flash", "Flash a USB lamp controller, and give a new one its identity",
         "darkbox lamps flash lamp-controller.hex --serial LC-0042", [a](const WorkContext&) { return flash(*a); },

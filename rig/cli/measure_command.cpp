@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct MeasureArguments {
     fs::path source_normals;
     fs::path source_albedo;
     fs::path source_mask;
@@ -31,7 +31,7 @@ NormalMap load_normals(const fs::path& file, const fs::path& mask) {
 }
 
 /// Pictures are judged as displayed. Radiance has no white of its own: both pictures then take the source's.
-TransferMeasures measured(const Arguments& a, const WorkContext& work) {
+TransferMeasures measured(const MeasureArguments& a, const WorkContext& work) {
     const NormalMap normals = load_normals(a.source_normals, a.source_mask);
     const NormalMap target = load_normals(a.target_normals, a.target_mask);
     const AlbedoMap albedo = read_albedo_map(a.source_albedo, normals.valid);
@@ -64,7 +64,7 @@ std::vector<Row> rows(const TransferMeasures& m) {
             {"background", "source pixels used that are not valid", m.background}};
 }
 
-CommandResult run(const Arguments& a, const WorkContext& work) {
+CommandResult run(const MeasureArguments& a, const WorkContext& work) {
     if (a.coordinates.empty() == a.picture.empty())
         throw InputError("measure-transfer needs one result", "give --coordinates FILE or --picture FILE");
     CommandResult result;
@@ -79,7 +79,7 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
 }  // namespace
 
 void add_measure_command(CommandLine& line) {
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<MeasureArguments>();
     CLI::App& command = line.add("measure-transfer", "Measure a transferred texture, darkbox's or anybody's",
                                  "darkbox measure-transfer --source-normals n.png --source-albedo a.png "
                                  "--target-normals t.png --coordinates moved/coordinates.png",

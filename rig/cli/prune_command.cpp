@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct PruneArguments {
     fs::path socket;
     fs::path folder;
     RetentionRules rules;
@@ -55,7 +55,7 @@ CommandResult result_of(const Json& report) {
     return result;
 }
 
-CommandResult prune_here(const Arguments& a, const WorkContext& work) {
+CommandResult prune_here(const PruneArguments& a, const WorkContext& work) {
     // A darkboxd that has the folder knows what its jobs wait for, and must be asked.
     std::optional<FolderLock> lock;
     if (!a.dry_run && !a.for_daemon && fs::is_directory(a.folder)) lock.emplace(a.folder / Catalog::own_folder_name);
@@ -63,7 +63,7 @@ CommandResult prune_here(const Arguments& a, const WorkContext& work) {
     return result_of(to_json(prune_sessions(a.folder, options, work), a.dry_run));
 }
 
-CommandResult prune_through(const DaemonClient& client, const Arguments& a, const WorkContext& work) {
+CommandResult prune_through(const DaemonClient& client, const PruneArguments& a, const WorkContext& work) {
     const auto job = client.call("POST", "jobs", {{"kind", "prune"}, {"dry_run", a.dry_run}});
     const auto end = FollowedJob(client, job, work, "ask for it again").end();
     if (end.at("event") == "cancelled") throw Cancelled(end.at("detail"), end.at("hint"));
@@ -71,7 +71,7 @@ CommandResult prune_through(const DaemonClient& client, const Arguments& a, cons
     return result_of(Json::parse(end.at("result").dump()));
 }
 
-CommandResult run(const Arguments& a, const WorkContext& work) {
+CommandResult run(const PruneArguments& a, const WorkContext& work) {
     const bool rules = a.rules.keep_days > 0;
     if (a.folder.empty() != !rules)
         throw InputError("--folder and --keep-days go together",
@@ -87,7 +87,7 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
 }  // namespace
 
 void add_prune_command(CommandLine& line, CLI::App& sessions) {
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<PruneArguments>();
     CLI::App& command = line.add(
         "prune", "Remove sessions that are old, proven good, and needed by no other",
         "darkbox sessions prune --dry-run\n  darkbox sessions prune --folder sessions --keep-days 90",

@@ -25,7 +25,7 @@ enum class Sequence {
     turn,    ///< the environment turning about the upright axis
 };
 
-struct Arguments {
+struct RelightOrder {
     std::filesystem::path session;
     std::filesystem::path out;
     RelightArguments relight;
@@ -36,12 +36,12 @@ struct Arguments {
     int bits = 8;
 };
 
-std::size_t count_pictures(const Arguments& a) {
+std::size_t count_pictures(const RelightOrder& a) {
     if (a.constant_r > 0) return a.constant_r;
     return a.sequence == Sequence::none ? 1 : a.frames;
 }
 
-void require_one_kind_of_light(const Arguments& a) {
+void require_one_kind_of_light(const RelightOrder& a) {
     const bool circle = a.sequence == Sequence::circle, turn = a.sequence == Sequence::turn;
     const std::size_t kinds = std::size_t{!a.relight.lights.empty() || !a.relight.lamp_positions.empty()} +
                               a.relight.environments.size() + std::size_t{circle} + std::size_t{a.constant_r > 0};
@@ -64,7 +64,7 @@ Light light_on_circle(double turn, double elevation_deg) {
 /// What lights the pictures, one after the other.
 class LightingPlan {
 public:
-    LightingPlan(const Arguments& a, const RelightOptions& options) : arguments_(a), options_(options) {
+    LightingPlan(const RelightOrder& a, const RelightOptions& options) : arguments_(a), options_(options) {
         require_readable_lights(a.relight);
         if (!a.relight.environments.empty()) environment_ = read_environment(a.relight.environments.front());
     }
@@ -84,7 +84,7 @@ public:
     }
 
 private:
-    const Arguments& arguments_;
+    const RelightOrder& arguments_;
     RelightOptions options_;
     Lights lights_;
     Environment environment_;
@@ -110,7 +110,7 @@ Seconds write_pictures(const std::vector<std::filesystem::path>& names, const Li
     return seconds;
 }
 
-CommandResult run(const Arguments& a, const WorkContext& work) {
+CommandResult run(const RelightOrder& a, const WorkContext& work) {
     // What will be needed after reading the maps is refused before it.
     require_outside_payload(a.out);
     require_one_kind_of_light(a);
@@ -146,7 +146,7 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
 }  // namespace
 
 void add_relight_command(CommandLine& line) {
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<RelightOrder>();
     CLI::App& command =
         line.add("relight", "Show the object under other lights or an environment, in one picture or many",
                  "darkbox relight s --light=-0.5,0.5,0.7 --light 1,0,1:0.2,0.3,0.6 --model phong --out relit.png\n  "

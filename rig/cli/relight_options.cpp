@@ -12,9 +12,9 @@
 namespace darkbox {
 namespace {
 
-const std::map<std::string, ReflectanceModel> models{{"lambert", ReflectanceModel::lambert},
-                                                     {"phong", ReflectanceModel::phong},
-                                                     {"phong-split", ReflectanceModel::phong_split}};
+const std::map<std::string, ReflectanceModel> reflectance_models{{"lambert", ReflectanceModel::lambert},
+                                                                 {"phong", ReflectanceModel::phong},
+                                                                 {"phong-split", ReflectanceModel::phong_split}};
 const std::map<std::string, Lookup> lookups{{"thesis", Lookup::thesis}, {"detail", Lookup::detail}};
 
 }  // namespace
@@ -37,7 +37,7 @@ void add_relight_options(CLI::App& command, RelightArguments& a) {
     command
         .add_option("--model", a.options.model,
                     "lambert; phong: one coefficient, highlights of the texel's colour; phong-split: a coat of gloss")
-        ->transform(one_of(models));
+        ->transform(one_of(reflectance_models));
     command
         .add_option("--lookup", a.options.lookup, "thesis: the texel's radiance; detail: scaled by the pixel's albedo")
         ->transform(one_of(lookups));
@@ -55,7 +55,7 @@ void add_relight_options(CLI::App& command, RelightArguments& a) {
 
 std::vector<std::string> described(const RelightArguments& arguments) {
     std::vector<std::string> parameters;
-    for (const auto& [name, model] : models)
+    for (const auto& [name, model] : reflectance_models)
         if (model == arguments.options.model) parameters.push_back("relight.model=" + name);
     for (const auto& [name, lookup] : lookups)
         if (lookup == arguments.options.lookup) parameters.push_back("relight.lookup=" + name);

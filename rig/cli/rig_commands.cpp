@@ -8,7 +8,7 @@
 #include "rig/capture/capture_run.h"
 #include "rig/capture/dosed_lamps.h"
 #include "rig/capture/light_dose.h"
-#include "rig/daemon/client.h"
+#include "rig/cli/daemon_questions.h"
 #include "rig/daemon/hardware.h"
 #include "rig/daemon/session_folder.h"
 #include "rig/health/rig_check.h"
@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct RigArguments {
     fs::path rig;
     fs::path socket;
     bool camera = false;
@@ -26,13 +26,6 @@ struct Arguments {
     std::string object;
     fs::path sessions;
 };
-
-DaemonClient client_for(const Arguments& a) { return DaemonClient(a.socket.empty() ? default_socket() : a.socket); }
-
-/// The daemon's answer, in the order in which Json prints.
-Json ask(const DaemonClient& client, const std::string& method, const std::string& target) {
-    return Json::parse(client.call(method, target).dump());
-}
 
 /// The objects that have had most light, and all of them for --json.
 void tell_doses(const Json& answer, CommandResult& result) {
@@ -52,9 +45,9 @@ void tell_doses(const Json& answer, CommandResult& result) {
                         objects[i].at("uv_j_per_m2").get<double>(), objects[i].at("ir_j_per_m2").get<double>());
 }
 
-CommandResult rig_status(const Arguments& a, const WorkContext&) {
+CommandResult rig_status(const RigArguments& a, const WorkContext&) {
     CommandResult result;
-    result.json = ask(client_for(a), "GET", "status");
+    result.json = ask(client_at(a.socket), "GET", "status");
     result.text =
         fmt::format("{}: {}, {} lamps, darkboxd {}", result.json.at("rig").get<std::string>(),
                     result.json.at("state").get<std::string>(), result.json.at("lamps").at("count").get<int>(),
@@ -64,7 +57,7 @@ CommandResult rig_status(const Arguments& a, const WorkContext&) {
         result.text += fmt::format("\ncapturing {}: {} of {}", job.at("session").get<std::string>(),
                                    job.at("progress").at("done").get<int>(), job.at("progress").at("total").get<int>());
     }
-    tell_doses(ask(client_for(a), "GET", "dose"), result);
+    tell_doses(ask(client_at(a.socket), "GET", "dose"), result);
     if (result.json.contains("problem")) result.warnings.push_back(result.json.at("problem"));
     return result;
 }
@@ -90,7 +83,7 @@ void tell_camera(const CameraInfo& camera, CommandResult& result) {
 Json number_or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 /// The light of a check is counted as a capture's is.
-RigReport measured(const Arguments& a, const RigDescription& rig, const CaptureDevices& devices,
+RigReport measured(const RigArguments& a, const RigDescription& rig, const CaptureDevices& devices,
                    const WorkContext& work) {
     if (!knows_doses(rig)) return check_rig(rig, devices, {}, work);
     DoseBook book(a.sessions.empty() ? default_sessions_folder() : a.sessions);
@@ -100,7 +93,7 @@ RigReport measured(const Arguments& a, const RigDescription& rig, const CaptureD
     return report;
 }
 
-void measure_rig(const Arguments& a, const RigDescription& rig, const WorkContext& work, CommandResult& result) {
+void measure_rig(const RigArguments& a, const RigDescription& rig, const WorkContext& work, CommandResult& result) {
     Hardware hardware(rig);
     RigReport report;
     hardware.open()->lend([&](const CaptureDevices& devices) { report = measured(a, rig, devices, work); });
@@ -123,7 +116,7 @@ void measure_rig(const Arguments& a, const RigDescription& rig, const WorkContex
                 fmt::format("{}{} was not measured: {}", f.what, f.where.empty() ? "" : " of " + f.where, f.words));
 }
 
-CommandResult rig_check(const Arguments& a, const WorkContext& work) {
+CommandResult rig_check(const RigArguments& a, const WorkContext& work) {
     const RigDescription rig = load_rig(a.rig);
     const CapturePlan plan = plan_capture(rig);
     CommandResult result;
@@ -139,22 +132,23 @@ CommandResult rig_check(const Arguments& a, const WorkContext& work) {
     return result;
 }
 
-using Run = CommandResult (*)(const Arguments&, const WorkContext&);
+using RigRun = CommandResult (*)(const RigArguments&, const WorkContext&);
 
-struct Added {
+struct RigCommand {
     CLI::App& command;
-    std::shared_ptr<Arguments> arguments;
+    std::shared_ptr<RigArguments> arguments;
 };
 
-Added add(CommandLine& line, CLI::App* group, const char* name, const char* description, const char* example, Run run) {
-    const auto a = std::make_shared<Arguments>();
+RigCommand add_rig_command(CommandLine& line, CLI::App* group, const char* name, const char* description,
+                           const char* example, RigRun run) {
+    const auto a = std::make_shared<RigArguments>();
     return {
         line.add(name, description, example, [a, run](const WorkContext& work) { return run(*a, work); }, group), a};
 }
 
 void add_to_daemon(CommandLine& line, CLI::App& group, const char* name, const char* description, const char* example,
-                   Run run) {
-    const auto [command, a] = add(line, &group, name, description, example, run);
+                   RigRun run) {
+    const auto [command, a] = add_rig_command(line, &group, name, description, example, run);
     command.add_option("--socket", a->socket, "Where darkboxd listens");
 }
 
@@ -164,8 +158,8 @@ void add_rig_commands(CommandLine& line) {
     CLI::App& rig = line.add_group("rig", "The rig as darkboxd sees it, and its description");
     add_to_daemon(line, rig, "status", "What darkboxd is doing", "darkbox rig status", rig_status);
     const auto [check, check_arguments] =
-        add(line, &rig, "check", "Check a rig.toml, and its camera, lamps and place if asked to",
-            "darkbox rig check --rig rig.toml --measure", rig_check);
+        add_rig_command(line, &rig, "check", "Check a rig.toml, and its camera, lamps and place if asked to",
+                        "darkbox rig check --rig rig.toml --measure", rig_check);
     check.add_option("--rig", check_arguments->rig, "The rig's description")->required();
     check.add_flag("--camera", check_arguments->camera, "Set up the camera, too, and tell what is in effect");
     auto* measure =

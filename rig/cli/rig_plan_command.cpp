@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct PlanArguments {
     RigPlanOptions options;
     fs::path toml;
 };
@@ -73,7 +73,7 @@ std::string lamps_toml(const std::vector<Eigen::Vector3d>& positions_mm) {
 }
 
 void add_rig_plan_command(CommandLine& line, CLI::App& rig) {
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<PlanArguments>();
     CLI::App& command = line.add(
         "plan", "Propose lamp positions that make normals as exact as they can be",
         "darkbox rig plan --lamps 12 --min-elevation 25 --toml lamps.toml",

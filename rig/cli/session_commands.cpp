@@ -75,7 +75,7 @@ CommandResult export_to(const fs::path& folder, const std::string& format, const
     return result;
 }
 
-struct Arguments {
+struct SessionArguments {
     fs::path session;
     fs::path out;
     std::string format;
@@ -84,7 +84,7 @@ struct Arguments {
 }  // namespace
 
 void add_session_commands(CommandLine& line) {
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<SessionArguments>();
     const auto take_session = [&a](CLI::App& command) -> CLI::App& {
         command.add_option("session", a->session, "The session's folder")->required();
         return command;

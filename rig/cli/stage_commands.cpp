@@ -13,7 +13,7 @@
 namespace darkbox {
 namespace {
 
-struct Arguments {
+struct StageArguments {
     std::filesystem::path session;
     ProcessOptions options;
     std::vector<std::string> balls;
@@ -25,7 +25,7 @@ struct Arguments {
 };
 
 /// The arguments as options, and those that need parsing parsed.
-ProcessOptions options_of(const Arguments& arguments) {
+ProcessOptions options_of(const StageArguments& arguments) {
     ProcessOptions options = arguments.options;
     CalibrationOptions& calibration = options.calibrate.calibration;
     for (const std::string& text : arguments.balls) calibration.balls.push_back(parse_ball(text));
@@ -106,7 +106,7 @@ CommandResult result_of(const ProcessSummary& summary) {
     return result;
 }
 
-void add_calibrate_options(CLI::App& command, Arguments& a) {
+void add_calibrate_options(CLI::App& command, StageArguments& a) {
     CalibrationOptions& calibration = a.options.calibrate.calibration;
     command.add_option("--ball", a.balls, "A ball's outline, pixels: X,Y,R; once for each ball (else they are found)");
     command.add_option("--ball-mask", a.ball_mask, "Picture that is white on the ball or balls");
@@ -132,7 +132,7 @@ void add_calibrate_options(CLI::App& command, Arguments& a) {
         ->transform(one_of(methods));
 }
 
-void add_normals_options(CLI::App& command, Arguments& a) {
+void add_normals_options(CLI::App& command, StageArguments& a) {
     std::map<std::string, Solver> solvers;
     for (const auto& [solver, text] : solver_names) solvers.emplace(text, solver);
     command
@@ -155,7 +155,7 @@ void add_normals_options(CLI::App& command, Arguments& a) {
         ->transform(one_of(choices));
 }
 
-void add_texels_options(CLI::App& command, Arguments& a) {
+void add_texels_options(CLI::App& command, StageArguments& a) {
     TexelOptions& texels = a.options.texels;
     command.add_option("--albedo-clusters", texels.albedo_clusters, "k of the first step")->capture_default_str();
     command
@@ -169,7 +169,7 @@ void add_texels_options(CLI::App& command, Arguments& a) {
     command.add_option("--seed", texels.seed, "Of the random choices")->capture_default_str();
 }
 
-void add_shade_options(CLI::App& command, Arguments& a) {
+void add_shade_options(CLI::App& command, StageArguments& a) {
     command.add_option("--levels", a.options.shading.levels, "Levels of the rendering coefficient")
         ->capture_default_str();
 }
@@ -177,7 +177,7 @@ void add_shade_options(CLI::App& command, Arguments& a) {
 /// A command over one session. `stage` takes (Session, ProcessOptions, WorkContext).
 template <class Stage>
 CLI::App& add_stage(CommandLine& line, const std::string& name, const std::string& description,
-                    const std::shared_ptr<Arguments>& a, Stage stage) {
+                    const std::shared_ptr<StageArguments>& a, Stage stage) {
     CLI::App& command =
         line.add(name, description, fmt::format("darkbox {} s", name), [a, stage](const WorkContext& work) {
             const Session session = Session::open(a->session);
@@ -191,7 +191,7 @@ CLI::App& add_stage(CommandLine& line, const std::string& name, const std::strin
 }  // namespace
 
 void add_stage_commands(CommandLine& line) {
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<StageArguments>();
     add_calibrate_options(add_stage(line, "calibrate", "Read the light directions off the mirror ball", a,
                                     [](const Session& s, const ProcessOptions& o, const WorkContext& w) {
                                         return run_calibrate(s, o.calibrate, w);

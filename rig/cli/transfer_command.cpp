@@ -29,7 +29,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct TransferArguments {
     fs::path source;
     fs::path source_normals;
     fs::path source_albedo;
@@ -54,7 +54,7 @@ struct Source {
     std::optional<ShadingMaps> shading;
 };
 
-Source load_source(const Arguments& a) {
+Source load_source(const TransferArguments& a) {
     const bool plain = !a.source_normals.empty() || !a.source_albedo.empty();
     if (plain == !a.source.empty())
         throw UsageError("transfer needs one source",
@@ -80,7 +80,7 @@ struct Target {
     SceneGeometry geometry = {};
 };
 
-Target load_target(const Arguments& a) {
+Target load_target(const TransferArguments& a) {
     const bool near = !a.relight.lamp_positions.empty();
     if (fs::is_directory(a.target)) {
         const Session session = Session::open(a.target);
@@ -95,7 +95,7 @@ Target load_target(const Arguments& a) {
                                  : Target{read_normal_map(a.target, read_mask(a.target_mask))};
 }
 
-ControlMaps load_control(const Arguments& a) {
+ControlMaps load_control(const TransferArguments& a) {
     if (a.source_control.empty() != a.target_control.empty())
         throw UsageError("a control map has two sides", "give --control-source FILE and --control-target FILE");
     if (a.source_control.empty()) return {};
@@ -108,7 +108,7 @@ struct CarriedMap {
     MapPicture map;
 };
 
-std::vector<CarriedMap> load_carried(const Arguments& a, cv::Size source) {
+std::vector<CarriedMap> load_carried(const TransferArguments& a, cv::Size source) {
     std::vector<CarriedMap> carried;
     for (const fs::path& file : a.apply) {
         const fs::path name = "applied-" + file.filename().string();
@@ -127,7 +127,8 @@ std::vector<CarriedMap> load_carried(const Arguments& a, cv::Size source) {
 }
 
 /// relit-1.png, relit-2.png, ... one for each light, then one for each environment.
-std::vector<fs::path> write_relit_pictures(const Arguments& a, const RelightScene& scene, const WorkContext& work) {
+std::vector<fs::path> write_relit_pictures(const TransferArguments& a, const RelightScene& scene,
+                                           const WorkContext& work) {
     const RelightOptions options = relight_options(a.relight);
     const Relighter relighter(scene, work);
     std::vector<fs::path> written;
@@ -145,7 +146,7 @@ std::vector<fs::path> write_relit_pictures(const Arguments& a, const RelightScen
 }
 
 /// The colours are the source's, so the pictures say what is known of it.
-void describe_transferred(const Arguments& a, const std::vector<fs::path>& relit) {
+void describe_transferred(const TransferArguments& a, const std::vector<fs::path>& relit) {
     const Session source = Session::open(a.source);
     std::vector<std::string> parameters{fmt::format("transfer.target={}", a.target.filename().string()),
                                         fmt::format("transfer.seed={}", a.options.seed)};
@@ -158,7 +159,7 @@ void describe_transferred(const Arguments& a, const std::vector<fs::path>& relit
 
 Json json_of(const std::optional<double>& figure) { return figure ? Json(*figure) : Json(); }
 
-CommandResult run(const Arguments& a, const WorkContext& work) {
+CommandResult run(const TransferArguments& a, const WorkContext& work) {
     const bool relit_wanted =
         !a.relight.lights.empty() || !a.relight.lamp_positions.empty() || !a.relight.environments.empty();
     require_outside_payload(a.out);
@@ -220,7 +221,7 @@ CommandResult run(const Arguments& a, const WorkContext& work) {
 }  // namespace
 
 void add_transfer_command(CommandLine& line) {
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<TransferArguments>();
     CLI::App& command =
         line.add("transfer", "Move an object's texture onto another object",
                  "darkbox transfer --source s --target other --out moved --light=-0.5,0.5,0.7 --environment sky.hdr",

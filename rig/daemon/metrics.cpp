@@ -13,7 +13,7 @@
 namespace darkbox {
 namespace {
 
-constexpr std::array states{ServiceState::offline, ServiceState::idle, ServiceState::busy, ServiceState::fault};
+constexpr std::array service_states{ServiceState::offline, ServiceState::idle, ServiceState::busy, ServiceState::fault};
 
 std::string head(const char* metric, const char* type, const char* help) {
     return fmt::format("# HELP {0} {2}\n# TYPE {0} {1}\n", metric, type, help);
@@ -57,7 +57,7 @@ std::string Metrics::text(Service& service) const {
     const auto space = std::filesystem::space(service.sessions(), ignored);
 
     std::string text = head("darkbox_state", "gauge", "1 for the state that the daemon is in");
-    for (const ServiceState state : states)
+    for (const ServiceState state : service_states)
         text += fmt::format("darkbox_state{{state=\"{}\"}} {}\n", name(state), state == status.state ? 1 : 0);
     text += head("darkbox_jobs_total", "counter", "Jobs that ended since the daemon started");
     for (const auto& [key, count] : jobs)

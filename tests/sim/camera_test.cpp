@@ -9,10 +9,6 @@
 namespace darkbox::sim {
 namespace {
 
-constexpr Nanoseconds second{1'000'000'000};
-
-Frame next(SimRig& rig) { return rig.camera().next_frame(rig.clock().now() + second); }
-
 SimRig streaming(const RigDescription& description, const FaultPlan& faults = {}) {
     SimRig rig = SimRig::make(description, faults);
     rig.camera().configure({});

@@ -9,8 +9,6 @@
 namespace darkbox::sim {
 namespace {
 
-constexpr Nanoseconds second{1'000'000'000};
-
 /// A camera that streams with this fault while lamp 2 burns.
 SimRig lit_rig(const std::string& faults) {
     SimRig rig = SimRig::make(small_rig(), parse_faults(faults));
@@ -19,8 +17,6 @@ SimRig lit_rig(const std::string& faults) {
     rig.lamps().light(LampId{2}, 1.0);
     return rig;
 }
-
-Frame next(SimRig& rig) { return rig.camera().next_frame(rig.clock().now() + second); }
 
 std::vector<std::uint64_t> sequences(SimRig& rig, int frames) {
     std::vector<std::uint64_t> result;

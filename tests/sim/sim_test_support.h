@@ -8,8 +8,14 @@
 #include "acquisition/frame/frame.h"
 #include "rig/description/rig_description.h"
 #include "sim/scenes.h"
+#include "sim/sim_rig.h"
 
 namespace darkbox::sim {
+
+constexpr Nanoseconds second{1'000'000'000};
+
+/// The next frame of a camera that streams; fails after a second without one.
+inline Frame next(SimRig& rig) { return rig.camera().next_frame(rig.clock().now() + second); }
 
 /// Lamps one metre away at these directions (need not be of unit length).
 inline std::vector<LampDescription> lamps_at(const std::vector<std::array<double, 3>>& directions) {

@@ -8,79 +8,80 @@
 namespace darkbox {
 namespace {
 
-const Ball ball{100, 80, 50, 1.0};
+const Ball big_ball{100, 80, 50, 1.0};
 
 TEST(ReflectAt, CentreOfTheBallMirrorsTheCamera) {
-    EXPECT_LT(angle_deg(reflect_at(ball, 100, 80).value(), {0, 0, 1}), 1e-9);
+    EXPECT_LT(angle_deg(reflect_at(big_ball, 100, 80).value(), {0, 0, 1}), 1e-9);
 }
 
 TEST(ReflectAt, TurnsTwiceAsFarAsTheNormal) {
     // The common mistake is to return the normal: it would lie at 22.5 degrees here, and the object look stretched.
     const double slant = 22.5 * std::numbers::pi / 180;
-    const auto light = reflect_at(ball, 100 + 50 * std::sin(slant), 80).value();
+    const auto light = reflect_at(big_ball, 100 + 50 * std::sin(slant), 80).value();
     EXPECT_LT(angle_deg(light, Eigen::Vector3d(1, 0, 1).normalized()), 1e-9);
 }
 
 TEST(ReflectAt, HighlightAboveTheCentreComesFromAbove) {
-    EXPECT_GT(reflect_at(ball, 100, 60).value().y(), 0.5);  // v runs down, y up
-    EXPECT_LT(reflect_at(ball, 80, 80).value().x(), -0.5);
+    EXPECT_GT(reflect_at(big_ball, 100, 60).value().y(), 0.5);  // v runs down, y up
+    EXPECT_LT(reflect_at(big_ball, 80, 80).value().x(), -0.5);
 }
 
-TEST(ReflectAt, NoDirectionOutsideTheBall) { EXPECT_FALSE(reflect_at(ball, 151, 80)); }
+TEST(ReflectAt, NoDirectionOutsideTheBall) { EXPECT_FALSE(reflect_at(big_ball, 151, 80)); }
 
 TEST(HighlightOf, IsTheInverse) {
     const Eigen::Vector3d light = Eigen::Vector3d(0.4, -0.5, 0.6).normalized();
-    const auto at = highlight_of(ball, light).value();
-    EXPECT_LT(angle_deg(reflect_at(ball, at.x, at.y).value(), light), 1e-9);
-    EXPECT_FALSE(highlight_of(ball, {0, 0, -1}));
+    const auto at = highlight_of(big_ball, light).value();
+    EXPECT_LT(angle_deg(reflect_at(big_ball, at.x, at.y).value(), light), 1e-9);
+    EXPECT_FALSE(highlight_of(big_ball, {0, 0, -1}));
 }
 
 const ViewGeometry orthographic{0.25, {120, 90}};
-const ViewGeometry perspective{0.25, {120, 90}, 800};
-const MirrorSphere sphere{{-30, 12, 4}, 18};
+const ViewGeometry perspective_view{0.25, {120, 90}, 800};
+const MirrorSphere near_sphere{{-30, 12, 4}, 18};
 
 TEST(ReflectAtSphere, IsTheThesisMethodWhenOrthographic) {
-    const Ball outline = outline_of(orthographic, sphere);
+    const Ball outline = outline_of(orthographic, near_sphere);
     for (const cv::Point2d at : {cv::Point2d(0, 0), cv::Point2d(20, -31), cv::Point2d(-40, 5)}) {
         const auto thesis = reflect_at(outline, outline.x + at.x, outline.y + at.y).value();
-        const auto ray = reflect_at(orthographic, sphere, {outline.x + at.x, outline.y + at.y}).value();
+        const auto ray = reflect_at(orthographic, near_sphere, {outline.x + at.x, outline.y + at.y}).value();
         EXPECT_LT(angle_deg(ray.direction, thesis), 1e-9);
-        EXPECT_NEAR((ray.point_mm - sphere.centre_mm).norm(), 18, 1e-9);
+        EXPECT_NEAR((ray.point_mm - near_sphere.centre_mm).norm(), 18, 1e-9);
     }
-    EXPECT_FALSE(reflect_at(orthographic, sphere, {outline.x + outline.radius + 0.1, outline.y}));
+    EXPECT_FALSE(reflect_at(orthographic, near_sphere, {outline.x + outline.radius + 0.1, outline.y}));
 }
 
 TEST(ReflectAtSphere, PerspectiveReflectsTheViewRay) {
     // The law of reflection itself: the normal halves the angle between the ways to the camera and to the lamp.
-    const cv::Point2d at = perspective.project(sphere.centre_mm) + cv::Point2d(20, 15);
-    const auto ray = reflect_at(perspective, sphere, at).value();
-    const Eigen::Vector3d normal = (ray.point_mm - sphere.centre_mm).normalized();
+    const cv::Point2d at = perspective_view.project(near_sphere.centre_mm) + cv::Point2d(20, 15);
+    const auto ray = reflect_at(perspective_view, near_sphere, at).value();
+    const Eigen::Vector3d normal = (ray.point_mm - near_sphere.centre_mm).normalized();
     const Eigen::Vector3d view = (Eigen::Vector3d(0, 0, 800) - ray.point_mm).normalized();
     EXPECT_LT(angle_deg(normal, (view + ray.direction).normalized()), 1e-9);
-    EXPECT_LT(cv::norm(perspective.project(ray.point_mm) - at), 1e-9);
+    EXPECT_LT(cv::norm(perspective_view.project(ray.point_mm) - at), 1e-9);
 }
 
 TEST(ReflectAtSphere, OrthographicIsTheLimit) {
     const ViewGeometry far{0.25, {120, 90}, 1e9};
-    const auto a = reflect_at(far, sphere, {10, 50}).value(), b = reflect_at(orthographic, sphere, {10, 50}).value();
+    const auto a = reflect_at(far, near_sphere, {10, 50}).value(),
+               b = reflect_at(orthographic, near_sphere, {10, 50}).value();
     EXPECT_LT(angle_deg(a.direction, b.direction), 1e-5);
 }
 
 TEST(HighlightOfSphere, IsTheInverseForAnyCameraAndLamp) {
     const Eigen::Vector3d direction = Eigen::Vector3d(0.4, -0.5, 0.6).normalized(), place(260, -330, 390);
-    for (const ViewGeometry& view : {orthographic, perspective}) {
-        const auto distant = reflect_at(view, sphere, highlight_of(view, sphere, direction).value()).value();
+    for (const ViewGeometry& view : {orthographic, perspective_view}) {
+        const auto distant = reflect_at(view, near_sphere, highlight_of(view, near_sphere, direction).value()).value();
         EXPECT_LT(angle_deg(distant.direction, direction), 1e-9);
-        const auto near = reflect_at(view, sphere, highlight_of_lamp(view, sphere, place).value()).value();
+        const auto near = reflect_at(view, near_sphere, highlight_of_lamp(view, near_sphere, place).value()).value();
         EXPECT_LT(angle_deg(near.direction, (place - near.point_mm).normalized()), 1e-9);
-        EXPECT_FALSE(highlight_of_lamp(view, sphere, sphere.centre_mm + Eigen::Vector3d(1, 2, 3)));
+        EXPECT_FALSE(highlight_of_lamp(view, near_sphere, near_sphere.centre_mm + Eigen::Vector3d(1, 2, 3)));
     }
-    EXPECT_FALSE(highlight_of(orthographic, sphere, {0, 0, -1}));
+    EXPECT_FALSE(highlight_of(orthographic, near_sphere, {0, 0, -1}));
 }
 
 TEST(OutlineOfSphere, IsWhereViewRaysGraze) {
-    for (const ViewGeometry& view : {orthographic, perspective}) {
-        const Ball outline = outline_of(view, sphere);
+    for (const ViewGeometry& view : {orthographic, perspective_view}) {
+        const Ball outline = outline_of(view, near_sphere);
         const BallEllipse ellipse = outline.ellipse.value_or(BallEllipse{outline.radius, outline.radius, 0});
         for (double turn = 0; turn < 6; turn += 0.5) {
             const double a = std::cos(turn), b = std::sin(turn);
@@ -90,22 +91,23 @@ TEST(OutlineOfSphere, IsWhereViewRaysGraze) {
                 return cv::Point2d(outline.x, outline.y) +
                        scale * (a * ellipse.along * along + b * ellipse.across * across);
             };
-            EXPECT_TRUE(reflect_at(view, sphere, at(1 - 1e-9)));
-            EXPECT_FALSE(reflect_at(view, sphere, at(1 + 1e-9)));
+            EXPECT_TRUE(reflect_at(view, near_sphere, at(1 - 1e-9)));
+            EXPECT_FALSE(reflect_at(view, near_sphere, at(1 + 1e-9)));
         }
     }
-    EXPECT_GT(outline_of(perspective, sphere).ellipse->along, outline_of(perspective, sphere).ellipse->across);
+    EXPECT_GT(outline_of(perspective_view, near_sphere).ellipse->along,
+              outline_of(perspective_view, near_sphere).ellipse->across);
 }
 
 TEST(SphereOf, UndoesOutlineOf) {
     const MirrorSphere in_plane{{-30, 12, 0}, 18};
-    for (const ViewGeometry& view : {orthographic, perspective}) {
+    for (const ViewGeometry& view : {orthographic, perspective_view}) {
         const MirrorSphere back = sphere_of(view, outline_of(view, in_plane));
         EXPECT_LT((back.centre_mm - in_plane.centre_mm).norm(), 1e-6);
         EXPECT_NEAR(back.radius_mm, 18, 1e-6);
     }
-    const MirrorSphere back = sphere_of(perspective, outline_of(perspective, sphere), 18.0);
-    EXPECT_LT((back.centre_mm - sphere.centre_mm).norm(), 1e-6);
+    const MirrorSphere back = sphere_of(perspective_view, outline_of(perspective_view, near_sphere), 18.0);
+    EXPECT_LT((back.centre_mm - near_sphere.centre_mm).norm(), 1e-6);
 }
 
 TEST(MeetingPoint, IsWhereRaysCross) {

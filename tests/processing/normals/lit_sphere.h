@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <functional>
 #include <numbers>
 #include <random>
@@ -10,6 +11,12 @@
 #include "processing/normals/photometric_stereo.h"
 
 namespace darkbox::test {
+
+/// Whether two maps are the same, bit for bit, where a NaN equals itself.
+inline bool same_bits(const cv::Mat& a, const cv::Mat& b) {
+    return a.size() == b.size() && a.type() == b.type() && a.isContinuous() && b.isContinuous() &&
+           std::memcmp(a.data, b.data, a.total() * a.elemSize()) == 0;
+}
 
 /// Radiance of a grey surface under light of irradiance 1, from normal, light and view.
 using Reflect = std::function<double(const Eigen::Vector3d& n, const Eigen::Vector3d& l, const Eigen::Vector3d& v)>;

@@ -10,12 +10,15 @@
 #include <random>
 
 #include "acquisition/frame/error.h"
+#include "tests/processing/normals/lit_sphere.h"
 
 namespace darkbox {
 namespace {
 
+using test::same_bits;
+
 constexpr int side = 65;
-constexpr double radius = 30;
+constexpr double sphere_radius = 30;
 const Eigen::Vector3d true_albedo(0.6, 0.4, 0.2);
 
 /// n lights on a cone about the viewing direction.
@@ -34,8 +37,8 @@ Lights ring(int n, double slant_deg = 30) {
 
 /// Normal of the test sphere at a pixel, or z < 0 outside it.
 Eigen::Vector3d sphere_normal(int row, int column) {
-    const double x = (column - side / 2) / radius;
-    const double y = -(row - side / 2) / radius;
+    const double x = (column - side / 2) / sphere_radius;
+    const double y = -(row - side / 2) / sphere_radius;
     const double zz = 1 - x * x - y * y;
     return zz > 0 ? Eigen::Vector3d(x, y, std::sqrt(zz)) : Eigen::Vector3d(0, 0, -1);
 }
@@ -82,11 +85,6 @@ double worst_lit_error_deg(const NormalMap& map, const Lights& lights) {
             worst = std::max(worst, error_deg(map, r, c));
         }
     return worst;
-}
-
-bool same_bits(const cv::Mat& a, const cv::Mat& b) {
-    return a.size() == b.size() && a.type() == b.type() && a.isContinuous() && b.isContinuous() &&
-           std::memcmp(a.data, b.data, a.total() * a.elemSize()) == 0;
 }
 
 TEST(PhotometricStereo, ExactLambertSphere) {

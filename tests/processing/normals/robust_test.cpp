@@ -15,6 +15,7 @@ namespace {
 
 using test::LitSphere;
 using test::mean_of;
+using test::same_bits;
 using test::spiral_lights;
 
 PhotometricStereoOptions with(Solver solver) {
@@ -141,10 +142,6 @@ TEST(Robust, FindsTheSensorsNoise) {
     // The mean of three channels has a third of a channel's variance.
     for (const double radiance : {0.1, 0.3, 0.5})
         EXPECT_NEAR(result.model.noise.variance(radiance) / ((1e-6 + 1e-4 * radiance) / 3), 1.0, 0.15) << radiance;
-}
-
-bool same_bits(const cv::Mat& a, const cv::Mat& b) {
-    return a.size() == b.size() && std::memcmp(a.data, b.data, a.total() * a.elemSize()) == 0;
 }
 
 TEST(Robust, SameBitsOnAnyNumberOfThreadsAndForAnyBands) {

@@ -32,12 +32,12 @@ AlbedoMap textured_disc(int side) {
     return map;
 }
 
-std::set<int> labels_of(const IndexMap& index) { return {index.label.begin(), index.label.end()}; }
+std::set<int> label_set_of(const IndexMap& index) { return {index.label.begin(), index.label.end()}; }
 
 TEST(ClusterTexels, LabelsHaveNoGapsAndAreZeroOutside) {
     const AlbedoMap disc = textured_disc(120);
     const TexelResult result = cluster_texels(disc);
-    std::set<int> labels = labels_of(result.index);
+    std::set<int> labels = label_set_of(result.index);
     EXPECT_EQ(*labels.begin(), 0);
     EXPECT_EQ(*labels.rbegin(), result.index.texels);
     EXPECT_EQ(static_cast<int>(labels.size()), result.index.texels + 1);

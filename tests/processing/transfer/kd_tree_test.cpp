@@ -11,7 +11,7 @@
 namespace darkbox {
 namespace {
 
-constexpr float anywhere = std::numeric_limits<float>::infinity();
+constexpr float at_any_distance = std::numeric_limits<float>::infinity();
 constexpr int all_leaves = std::numeric_limits<int>::max();
 
 PointSet random_points(std::size_t count, std::size_t dimensions, std::uint64_t seed) {
@@ -52,7 +52,7 @@ TEST_P(KdTreeAgainstBruteForce, WithoutALimitItIsExact) {
     const KdTree tree(points);
     std::vector<Match> matches;
     for (std::size_t i = 0; i < queries.size(); ++i) {
-        tree.nearest(queries[i], 4, anywhere, all_leaves, matches);
+        tree.nearest(queries[i], 4, at_any_distance, all_leaves, matches);
         EXPECT_EQ(numbers(matches), numbers(by_brute_force(points, queries[i], 4)));
     }
 }
@@ -75,7 +75,7 @@ TEST(KdTree, HoldsManyEqualPoints) {
     const KdTree tree(points);
     std::vector<Match> matches;
     const float query[] = {0.25F, 0.25F};
-    tree.nearest(query, 3, anywhere, all_leaves, matches);
+    tree.nearest(query, 3, at_any_distance, all_leaves, matches);
     ASSERT_EQ(matches.size(), 3U);
     EXPECT_EQ(matches.front().squared_distance, 0.0F);
 }
@@ -87,7 +87,7 @@ TEST(KdTree, FewLeavesAreNearlyExactInManyDimensions) {
     std::vector<Match> matches;
     double ratio = 0;
     for (std::size_t i = 0; i < queries.size(); ++i) {
-        tree.nearest(queries[i], 1, anywhere, 64, matches);
+        tree.nearest(queries[i], 1, at_any_distance, 64, matches);
         ratio += std::sqrt(matches.front().squared_distance /
                            by_brute_force(points, queries[i], 1).front().squared_distance);
     }

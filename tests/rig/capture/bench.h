@@ -48,6 +48,12 @@ struct Bench {
     }
 };
 
+inline std::vector<std::string> files_of(const Session& session) {
+    std::vector<std::string> files;
+    for (const FrameRecord& record : session.frames()) files.push_back(record.file);
+    return files;
+}
+
 /// Every frame of the session was lit by its lamp, by all of it and by nothing else, as its own pixels tell.
 inline void expect_every_frame_right(const Session& session, const RigDescription& rig) {
     session.verify();

@@ -7,14 +7,9 @@ namespace darkbox {
 namespace {
 
 using test::Bench;
+using test::files_of;
 using testing::AllOf;
 using testing::HasSubstr;
-
-std::vector<std::string> files_of(const Session& session) {
-    std::vector<std::string> files;
-    for (const FrameRecord& record : session.frames()) files.push_back(record.file);
-    return files;
-}
 
 TEST(DarkFrames, ComeEverySoManyLamps) {
     Bench bench;
@@ -30,8 +25,8 @@ TEST(DarkFrames, ComeEverySoManyLamps) {
 }
 
 /// Light that comes into the box once the second lamp went dark, and stays for so many frames.
-struct Door {
-    explicit Door(Bench& bench, int frames) {
+struct LeakingDoor {
+    explicit LeakingDoor(Bench& bench, int frames) {
         bench.rig.capture.dark_every = 2;
         bench.lamps.hook = [this](const std::string& call) {
             if (call == "light") ++lit;
@@ -51,7 +46,7 @@ struct Door {
 
 TEST(DarkFrames, ADoorThatOpensIsFoundAtTheNextOneAndEndsTheCapture) {
     Bench bench;
-    const Door door(bench, 1000);
+    const LeakingDoor door(bench, 1000);
     EXPECT_THAT(bench.error<InputError>(),
                 AllOf(HasSubstr("frame 0003_dark"), HasSubstr("differs from the first one by +0.063")));
     EXPECT_EQ(door.lit, 2) << "no lamp is lit in vain after that";
@@ -60,7 +55,7 @@ TEST(DarkFrames, ADoorThatOpensIsFoundAtTheNextOneAndEndsTheCapture) {
 
 TEST(DarkFrames, OneThatDiffersForAMomentIsTakenAgain) {
     Bench bench;
-    const Door door(bench, 3);
+    const LeakingDoor door(bench, 3);
     const Session session = bench.capture();
     EXPECT_EQ(session.frames().size(), 7U);
     EXPECT_THAT(test::events_of(session), HasSubstr("0003_dark: try 1 of 3: the dark frame differs"));

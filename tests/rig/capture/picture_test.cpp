@@ -11,10 +11,10 @@
 namespace darkbox {
 namespace {
 
-constexpr double black = 100;
+constexpr double picture_black = 100;
 constexpr double read_noise = 3;    // samples
 constexpr double shot_noise = 0.2;  // variance per sample of signal
-constexpr double full_scale = 4095;
+constexpr double picture_full_scale = 4095;
 
 /// splitmix64 made into normal deviates by Box and Muller's method.
 class Deviates {
@@ -51,39 +51,40 @@ Picture shoot(const Light& light, Deviates& noise) {
                                   std::sqrt(1 + p * p + q * q);
             const double signal = light.strength * std::max(0.0, cosine);
             const double deviation = std::sqrt(read_noise * read_noise + shot_noise * signal);
-            const double sample = black + signal + deviation * noise.next();
-            picture.samples.push_back(static_cast<std::uint16_t>(std::clamp(std::round(sample), 0.0, full_scale)));
+            const double sample = picture_black + signal + deviation * noise.next();
+            picture.samples.push_back(
+                static_cast<std::uint16_t>(std::clamp(std::round(sample), 0.0, picture_full_scale)));
         }
     }
     return picture;
 }
 
-const Light none{0, 0, 0};
+const Light no_light{0, 0, 0};
 
 TEST(Noise, IsMeasuredFromTwoExposuresOfOneLight) {
     Deviates noise(1);
-    const Picture dark = shoot(none, noise);
+    const Picture dark = shoot(no_light, noise);
     const Light light{30, 45, 2000};
-    const NoiseModel model = measure_noise(shoot(light, noise), shoot(light, noise), dark, full_scale);
+    const NoiseModel model = measure_noise(shoot(light, noise), shoot(light, noise), dark, picture_full_scale);
     EXPECT_NEAR(model.slope, shot_noise, 0.05 * shot_noise);
     EXPECT_NEAR(model.variance(1000), read_noise * read_noise + shot_noise * 1000, 8);
 }
 
 TEST(Noise, LeavesSaturatedSamplesOut) {
     Deviates noise(2);
-    const Picture dark = shoot(none, noise);
+    const Picture dark = shoot(no_light, noise);
     const Light light{30, 45, 5000};  // about half the samples clip
-    const NoiseModel model = measure_noise(shoot(light, noise), shoot(light, noise), dark, full_scale);
+    const NoiseModel model = measure_noise(shoot(light, noise), shoot(light, noise), dark, picture_full_scale);
     EXPECT_NEAR(model.variance(2000), shot_noise * 2000, 80);
 }
 
 TEST(Comparison, OfOneLightFindsNoiseOnly) {
     Deviates noise(3);
-    const Picture dark = shoot(none, noise);
+    const Picture dark = shoot(no_light, noise);
     for (const double strength : {10.0, 100.0, 1000.0, 3000.0}) {
         const Light light{75, 50, strength};
         const Picture first = shoot(light, noise);
-        const NoiseModel model = measure_noise(first, shoot(light, noise), dark, full_scale);
+        const NoiseModel model = measure_noise(first, shoot(light, noise), dark, picture_full_scale);
         const Difference difference = compare(first, shoot(light, noise), dark, model);
         EXPECT_NEAR(difference.gain, 1.0, 0.02) << strength;
         EXPECT_NEAR(difference.pixels.value, 1.0, 0.02 + 4 * difference.pixels.sigma) << strength;
@@ -93,10 +94,10 @@ TEST(Comparison, OfOneLightFindsNoiseOnly) {
 
 TEST(Comparison, ForgivesAFlickeringLamp) {
     Deviates noise(4);
-    const Picture dark = shoot(none, noise);
+    const Picture dark = shoot(no_light, noise);
     const Light light{75, 50, 2000};
     const Light brighter{75, 50, 2040};
-    const NoiseModel model = measure_noise(shoot(light, noise), shoot(light, noise), dark, full_scale);
+    const NoiseModel model = measure_noise(shoot(light, noise), shoot(light, noise), dark, picture_full_scale);
     const Difference difference = compare(shoot(brighter, noise), shoot(light, noise), dark, model);
     EXPECT_NEAR(difference.gain, 1.02, 0.002);
     EXPECT_NEAR(difference.pixels.value, 1.0, 0.02 + 4 * difference.pixels.sigma);
@@ -107,11 +108,11 @@ TEST(Comparison, ForgivesAFlickeringLamp) {
 /// full scale) that the change of a single sample drowns in noise.
 TEST(Comparison, TellsLampsFiveDegreesApartInFaintLight) {
     Deviates noise(5);
-    const Picture dark = shoot(none, noise);
+    const Picture dark = shoot(no_light, noise);
     for (const double strength : {300.0, 1000.0, 3000.0}) {
         const Light here{0, 50, strength};
         const Light there{5, 50, strength};
-        const NoiseModel model = measure_noise(shoot(here, noise), shoot(here, noise), dark, full_scale);
+        const NoiseModel model = measure_noise(shoot(here, noise), shoot(here, noise), dark, picture_full_scale);
         const Difference difference = compare(shoot(here, noise), shoot(there, noise), dark, model);
         EXPECT_GT(difference.pixels.value, 1.05 + 6 * difference.pixels.sigma) << strength;
     }

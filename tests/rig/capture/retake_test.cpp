@@ -14,14 +14,9 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::Bench;
+using test::files_of;
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-std::vector<std::string> files_of(const Session& session) {
-    std::vector<std::string> files;
-    for (const FrameRecord& record : session.frames()) files.push_back(record.file);
-    return files;
-}
 
 const FrameRecord& frame_named(const Session& session, const std::string& file) {
     for (const FrameRecord& record : session.frames())

@@ -10,8 +10,8 @@ namespace darkbox {
 namespace {
 
 constexpr int columns = 40, rows = 48;
-constexpr double full_scale = 4095, black = 64;
-constexpr NoiseModel noise{4.0, 0.05};
+constexpr double witness_full_scale = 4095, witness_black = 64;
+constexpr NoiseModel witness_noise{4.0, 0.05};
 
 /// Two lamps over one body, a camera whose rows are exposed one after another, and the moment of a switch between them.
 class SwitchWitness : public testing::Test {
@@ -29,9 +29,10 @@ protected:
             const LightShares s = shares(y / (rows - 1.0));
             for (int x = 0; x < columns; ++x) {
                 const double signal = s.before * light(0, x, y) + s.after * light(1, x, y);
-                std::normal_distribution<double> deviate(black + signal, std::sqrt(noise.variance(signal)));
+                std::normal_distribution<double> deviate(witness_black + signal,
+                                                         std::sqrt(witness_noise.variance(signal)));
                 p.samples.push_back(
-                    static_cast<std::uint16_t>(std::clamp(std::round(deviate(random)), 0.0, full_scale)));
+                    static_cast<std::uint16_t>(std::clamp(std::round(deviate(random)), 0.0, witness_full_scale)));
             }
         }
         return p;
@@ -49,7 +50,7 @@ protected:
         const Picture after = picture([](double) { return LightShares{0, 1}; });
         const Picture spoiled = picture([&](double height) { return shares(height, readout, lie); });
         return hear_witness(
-            {&dark, &before, &spoiled, &after}, noise, full_scale,
+            {&dark, &before, &spoiled, &after}, witness_noise, witness_full_scale,
             [&](double height) { return shares(height, readout, 0); }, tolerance);
     }
 
@@ -81,7 +82,7 @@ TEST_F(SwitchWitness, SaysThatItTellsNothingWhenTheSwitchFellIntoTheGap) {
     const Picture dark = picture([](double) { return LightShares{0, 0}; });
     const Picture before = picture([](double) { return LightShares{1, 0}; });
     const Picture after = picture([](double) { return LightShares{0, 1}; });
-    const WitnessReport report = hear_witness({&dark, &before, &before, &after}, noise, full_scale,
+    const WitnessReport report = hear_witness({&dark, &before, &before, &after}, witness_noise, witness_full_scale,
                                               [](double) { return LightShares{1, 0}; }, {0.05, 0.05});
     EXPECT_FALSE(report.informative);
     EXPECT_TRUE(report.agrees);
@@ -90,7 +91,7 @@ TEST_F(SwitchWitness, SaysThatItTellsNothingWhenTheSwitchFellIntoTheGap) {
 TEST_F(SwitchWitness, LampsThatLookAlikeTellNothing) {
     const Picture dark = picture([](double) { return LightShares{0, 0}; });
     const Picture one = picture([](double) { return LightShares{1, 0}; });
-    const WitnessReport report = hear_witness({&dark, &one, &one, &one}, noise, full_scale,
+    const WitnessReport report = hear_witness({&dark, &one, &one, &one}, witness_noise, witness_full_scale,
                                               [](double) { return LightShares{0.5, 0.5}; }, {0.05, 0.05});
     EXPECT_FALSE(report.informative);
 }
@@ -102,8 +103,8 @@ TEST_F(SwitchWitness, BandsShowAFewRowsOfForeignLight) {
     const Picture pure = picture([](double) { return LightShares{0, 1}; });
     const Picture tinged =
         picture([](double height) { return height < 0.05 ? LightShares{0.2, 0.8} : LightShares{0, 1}; });
-    EXPECT_LE(compare_bands({&dark, &before, &pure, &after}, noise, full_scale).most_before, 0.002);
-    EXPECT_GE(compare_bands({&dark, &before, &tinged, &after}, noise, full_scale).most_before, 0.1);
+    EXPECT_LE(compare_bands({&dark, &before, &pure, &after}, witness_noise, witness_full_scale).most_before, 0.002);
+    EXPECT_GE(compare_bands({&dark, &before, &tinged, &after}, witness_noise, witness_full_scale).most_before, 0.1);
 }
 
 /// Most of a real picture is backdrop: noise, and lamps that look alike in it, must accuse nobody.
@@ -113,7 +114,7 @@ TEST_F(SwitchWitness, RowsWithHardlyAnyLightAccuseNobody) {
         const Picture dark = picture([](double) { return LightShares{0, 0}; });
         const Picture before = picture([](double) { return LightShares{0.004, 0.0001}; });
         const Picture one = picture(faint(0.0)), two = picture(faint(0.0));
-        const BandLights lights = compare_bands({&dark, &before, &one, &two}, noise, full_scale);
+        const BandLights lights = compare_bands({&dark, &before, &one, &two}, witness_noise, witness_full_scale);
         EXPECT_LE(lights.most_before, 0.002);
         EXPECT_LE(lights.most_missing, 0.03);
     }

@@ -15,7 +15,7 @@ std::string simulated(const std::string& sections, const std::string& lamp_keys 
            lamp_keys;
 }
 
-std::string real(const std::string& door) {
+std::string real_with_door(const std::string& door) {
     return "[rig]\nname = \"r\"\n[camera]\ndriver = \"v4l2\"\ndevice = \"cam\"\n" + door +
            "\n[lamps]\ndriver = \"gpio\"\n[lamps.gpio]\nchip = \"soc\"\n[[lamps.lamp]]\nname = \"a\"\nline = 1\n"
            "position_mm = [0, 0, 900]\n";
@@ -63,16 +63,16 @@ TEST(Dose, BudgetsNeedLampsThatSayWhatTheyGive) {
 }
 
 TEST(Door, IsALineOfTheLampsChipUnlessAnotherIsNamed) {
-    const RigDescription rig = parse_rig(real("[door]\nline = \"GPIO21\"\nactive_low = true\n"), "rig.toml");
+    const RigDescription rig = parse_rig(real_with_door("[door]\nline = \"GPIO21\"\nactive_low = true\n"), "rig.toml");
     ASSERT_TRUE(rig.door);
     EXPECT_EQ(rig.door->chip, "soc");
     EXPECT_EQ(rig.door->line, "GPIO21");
     EXPECT_TRUE(rig.door->active_low);
-    EXPECT_EQ(parse_rig(real("[door]\nchip = \"hat\"\nline = 4\n"), "rig.toml").door->chip, "hat");
-    EXPECT_FALSE(parse_rig(real(""), "rig.toml").door);
+    EXPECT_EQ(parse_rig(real_with_door("[door]\nchip = \"hat\"\nline = 4\n"), "rig.toml").door->chip, "hat");
+    EXPECT_FALSE(parse_rig(real_with_door(""), "rig.toml").door);
 }
 
-TEST(Door, OfARealRigHasALine) { EXPECT_THAT(problem(real("[door]\n")), HasSubstr("line is missing")); }
+TEST(Door, OfARealRigHasALine) { EXPECT_THAT(problem(real_with_door("[door]\n")), HasSubstr("line is missing")); }
 
 TEST(Door, OfASimulatedRigHasNone) {
     EXPECT_TRUE(parse_rig(simulated("[door]\n"), "rig.toml").door);

@@ -243,7 +243,7 @@ TEST_F(UsbLampsTest, AProgramSteppedByTheStrobe) {
 TEST_F(UsbLampsTest, StepsBetweenTheExposuresOfAStrobedCamera) {
     constexpr Nanoseconds period = 50ms, up = 20ms, stepped = 30ms;
     const TimePoint first = SystemClock().now() + 200ms;
-    const auto phase = [&](TimePoint t) { return (t - first) % period; };
+    const auto phase = [=](TimePoint t) { return (t - first) % period; };  // outlives this test in the strobe line
     struct Switch {
         TimePoint when;
         std::uint64_t lit;
