@@ -10,6 +10,7 @@
 #include "acquisition/frame/error.h"
 #include "rig/capture/interlock.h"
 #include "rig/capture/timing_store.h"
+#include "rig/health/lamp_review.h"
 #include "rig/lamps/gpio_lamps.h"
 #include "rig/lamps/usb_lamps.h"
 #include "sim/sim_rig.h"
@@ -47,11 +48,16 @@ CaptureOutcome capture_with(const CaptureDevices& devices, Door* door, const Cap
     const auto start = Stopwatch::now();
     CaptureOutcome outcome;
     drive(devices, door, [&](const CaptureDevices& d) {
-        const auto [session, summary] = capture_session(request, rig, d.lamps, d.camera, d.clock, work, measured);
+        CaptureRequest reviewed = request;
+        if (rig.capture.lamp_places)
+            reviewed.review = [&rig](const SessionWriter& session) { return review_lamp_places(session, rig); };
+        const auto [session, summary, findings] =
+            capture_session(reviewed, rig, d.lamps, d.camera, d.clock, work, measured);
         outcome = {.session = session.folder(),
                    .frames = session.frames().size(),
                    .resumed = summary.resumed,
-                   .repeated = summary.repeated};
+                   .repeated = summary.repeated,
+                   .findings = findings};
     });
     outcome.duration = Stopwatch::now() - start;
     return outcome;

@@ -103,6 +103,7 @@ struct CaptureDescription {
     Seconds frame_deadline{5.0};        ///< the longest wait for one frame
     int tries = 3;                      ///< per shot, before the session fails
     double min_signal = 0.002;          ///< a lit frame's mean must exceed the dark frame's by this share of full scale
+    bool lamp_places = true;            ///< the mirror ball is to show every lamp where it is known to stand
     double max_dark = 0.01;             ///< a dark frame's mean may exceed the black level by this share of full scale
 };
 
