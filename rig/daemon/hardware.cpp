@@ -10,7 +10,7 @@
 #include "acquisition/frame/error.h"
 #include "rig/capture/interlock.h"
 #include "rig/capture/timing_store.h"
-#include "rig/health/lamp_review.h"
+#include "rig/health/frame_review.h"
 #include "rig/lamps/gpio_lamps.h"
 #include "rig/lamps/usb_lamps.h"
 #include "sim/sim_rig.h"
@@ -49,8 +49,7 @@ CaptureOutcome capture_with(const CaptureDevices& devices, Door* door, const Cap
     CaptureOutcome outcome;
     drive(devices, door, [&](const CaptureDevices& d) {
         CaptureRequest reviewed = request;
-        if (rig.capture.lamp_places)
-            reviewed.review = [&rig](const SessionWriter& session) { return review_lamp_places(session, rig); };
+        reviewed.review = [&rig](const SessionWriter& frames) { return review_frames(frames, rig); };
         const auto [session, summary, findings] =
             capture_session(reviewed, rig, d.lamps, d.camera, d.clock, work, measured);
         outcome = {.session = session.folder(),

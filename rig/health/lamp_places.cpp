@@ -141,7 +141,11 @@ std::optional<BallPlaces> places_on_ball(const std::vector<LampPicture>& picture
     const auto radius_mm = rig.ball_diameter_mm ? std::optional(*rig.ball_diameter_mm / 2) : std::nullopt;
     const MirrorSphere sphere = sphere_of(view, *ball, radius_mm);
     const bool has_scale = rig.camera.mm_per_pixel || rig.ball_diameter_mm;
-    BallPlaces places{{{rig.name, {}}, {}, false}, {}};
+    BallPlaces places{*ball, {{rig.name, {}}, {}, false}, {}};
+    const double factor = pictures.front().factor;
+    places.ball.x = (ball->x + 0.5) * factor - 0.5;
+    places.ball.y = (ball->y + 0.5) * factor - 0.5;
+    places.ball.radius *= factor;
     if (has_scale) places.ball_mm = sphere.centre_mm;
     // Half of the angle between view and light is the normal's.
     const double sigma_deg = 2 * outline_sigma_px / ball->radius * 180 / std::numbers::pi;

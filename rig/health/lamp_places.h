@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "processing/calibration/calibration.h"
 #include "processing/calibration/drift.h"
 #include "rig/description/rig_description.h"
 
@@ -29,6 +30,7 @@ struct LampPicture {
 
 /// Directions to the lamps as a mirror ball shows them.
 struct BallPlaces {
+    Ball ball;                               ///< in the frame's pixels
     RigLights lights;                        ///< distant: from the ball; unused where it shows no image of the lamp
     std::optional<Eigen::Vector3d> ball_mm;  ///< viewer frame; none: the scale of the pictures is not known
 };

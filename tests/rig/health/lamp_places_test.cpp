@@ -7,8 +7,8 @@
 
 #include "processing/pipeline/stages.h"
 #include "rig/capture/capture_session.h"
+#include "rig/health/frame_review.h"
 #include "rig/health/known_lamps.h"
-#include "rig/health/lamp_review.h"
 #include "sim/sim_rig.h"
 #include "tests/support/test_data.h"
 
@@ -19,8 +19,8 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-RigDescription dome(const std::string& faults = "", int lamps = 8) {
-    RigDescription rig = parse_rig(simulated_rig_toml(lamps), "twin");
+RigDescription dome(const std::string& faults = "") {
+    RigDescription rig = parse_rig(simulated_rig_toml(8), "twin");
     rig.sim.width = 160;
     rig.sim.height = 120;
     rig.camera.mm_per_pixel = 1.25;
@@ -28,9 +28,9 @@ RigDescription dome(const std::string& faults = "", int lamps = 8) {
     return rig;
 }
 
-/// The same rig, with one of its lamps turned about the camera's axis, or all.
+/// The same rig in larger pictures, whose ball tells angles twice as well, with one of its lamps turned, or all.
 RigDescription turned(double degrees, std::optional<std::size_t> lamp) {
-    RigDescription rig = dome();
+    RigDescription rig = parse_rig(simulated_rig_toml(8), "twin");
     const Eigen::AngleAxisd turn(degrees * std::numbers::pi / 180, Eigen::Vector3d::UnitX());
     for (std::size_t i = 0; i < rig.lamps.size(); ++i) {
         if (lamp && *lamp != i) continue;
@@ -48,7 +48,7 @@ protected:
         sim::SimRig sim = sim::SimRig::make(rig);
         CaptureRequest request{.folder = folder_.path() / name, .object = object, .lamps = {}};
         request.retake = std::move(retake);
-        request.review = [&rig](const SessionWriter& session) { return review_lamp_places(session, rig); };
+        request.review = [&rig](const SessionWriter& session) { return review_frames(session, rig); };
         return capture_session(request, rig, sim.lamps(), sim.camera(), sim.clock());
     }
 
@@ -113,10 +113,10 @@ TEST_F(LampPlaces, AreComparedWithTheLatestCalibration) {
 }
 
 TEST_F(LampPlaces, TellHowFarALampMoved) {
-    run_calibrate(capture("first", dome()).session);
+    run_calibrate(capture("first", turned(0, 3)).session);
     const auto captured = capture("second", turned(9, 3));
     ASSERT_EQ(captured.findings.size(), 1U);
-    const auto known = calibrated_lamps(folder_.path(), dome(), "");
+    const auto known = calibrated_lamps(folder_.path(), turned(0, 3), "second");
     const Eigen::Vector3d before = known->lights.lights[3].direction;
     const auto& place = turned(9, 3).lamps[3].position_mm;
     const double moved = angle_deg(before, Eigen::Vector3d(place[0], place[1], place[2]).normalized());
@@ -127,7 +127,7 @@ TEST_F(LampPlaces, TellHowFarALampMoved) {
 }
 
 TEST_F(LampPlaces, TellACameraThatWasKnocked) {
-    run_calibrate(capture("first", dome()).session);
+    run_calibrate(capture("first", turned(0, 3)).session);
     const auto captured = capture("second", turned(6, std::nullopt));
     ASSERT_EQ(captured.findings.size(), 1U);
     EXPECT_THAT(captured.findings.front(), HasSubstr("all lamps shine from 6."));
@@ -149,6 +149,24 @@ TEST_F(LampPlaces, OfNearLampsAreThoseSeenFromTheBall) {
         rig.sim.faults = faults;
         const auto captured = capture(fmt::format("near-{}", findings), rig);
         EXPECT_EQ(captured.findings.size(), findings) << testing::PrintToString(captured.findings);
+    }
+}
+
+/// From the frame on that belongs to the fourth lamp something is not where it was.
+TEST_F(LampPlaces, AndMovementAreTold) {
+    for (const auto& [fault, who] :
+         {std::pair{"camera-knock", "the camera moved by "}, std::pair{"object-knock", "the object moved by "}}) {
+        RigDescription rig = dome();
+        rig.capture.closing_repeat = true;
+        const Session still = capture(std::string("still-") + fault, rig).session;
+        rig.sim.faults = fmt::format("{}@{}=0.8", fault, still.frames()[4].sequence - 1);
+        const auto captured = capture(fault, rig);
+        ASSERT_EQ(captured.findings.size(), 1U) << fault;
+        const std::string& words = captured.findings.front();
+        ASSERT_THAT(words, testing::StartsWith(who));
+        EXPECT_NEAR(std::stod(words.substr(std::string(who).size())), 0.8, 0.05) << words;
+        EXPECT_THAT(words, HasSubstr("between the first and the last frame of lamp-01"));
+        EXPECT_THAT(doubted(captured.session), IsEmpty());
     }
 }
 
