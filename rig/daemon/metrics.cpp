@@ -79,6 +79,9 @@ std::string Metrics::text(Service& service) const {
                 refused_.load());
     text += one("darkbox_http_connections", "gauge", "Open connections", connections_.load());
     text += one("darkbox_event_listeners", "gauge", "Connections that listen to events", listeners_.load());
+    if (const auto expires = certificate_expires_.load(); expires != 0)
+        text += one("darkbox_tls_certificate_expires_seconds", "gauge", "When the certificate in use ends, since 1970",
+                    expires);
     text += one("process_resident_memory_bytes", "gauge", "Memory in use", resident_bytes());
     return text;
 }

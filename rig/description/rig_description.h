@@ -145,6 +145,8 @@ struct RigDescription {
     std::string socket_group;               ///< [api] group: whose members may use the socket; empty = only the owner
     std::string listen;                     ///< [api] listen: "127.0.0.1:7640"; empty = no TCP
     std::filesystem::path token_file;       ///< [api] token_file, for TCP; empty = beside the socket
+    std::filesystem::path certificate;      ///< [api] certificate, PEM; empty = TCP without TLS, on loopback only
+    std::filesystem::path key;              ///< [api] key, PEM; empty as the certificate is
     std::optional<RetentionRules> retention = {};  ///< none: sessions are never removed
     std::string toml;                              ///< the text it came from, byte for byte
 };
