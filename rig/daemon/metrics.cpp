@@ -63,6 +63,10 @@ std::string Metrics::text(Service& service) const {
     for (const auto& [key, count] : jobs)
         text += fmt::format("darkbox_jobs_total{{kind=\"{}\",state=\"{}\"}} {}\n", name(key.first), name(key.second),
                             count);
+    text += one("darkbox_lamps_reachable", "gauge", "1 while the lamps answer", status.lamps.reachable ? 1 : 0);
+    if (status.lamps.temperature_c)
+        text +=
+            one("darkbox_lamps_temperature_celsius", "gauge", "Of the lamps' heat sink", *status.lamps.temperature_c);
     text += one("darkbox_captures_queued", "gauge", "Captures that wait for the rig", status.queued);
     text += one("darkbox_processing_jobs", "gauge", "Processing jobs, running or waiting", status.processing);
     text += one("darkbox_frames_total", "counter", "Frames of captures that ended", service.frames_captured());

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "acquisition/frame/units.h"
+#include "rig/description/health_description.h"
 #include "rig/description/retention_rules.h"
 
 namespace darkbox {
@@ -138,6 +139,7 @@ struct RigDescription {
     std::optional<double> ball_diameter_mm;
     DoseDescription dose;
     std::optional<DoorDescription> door;
+    HealthDescription health;
     CaptureDescription capture;
     SimDescription sim;
     std::filesystem::path sessions_folder;  ///< [api] sessions; empty = the caller's default
