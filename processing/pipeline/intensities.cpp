@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "acquisition/frame/error.h"
+#include "processing/calibration/card_intensity.h"
 #include "processing/calibration/lamp_checks.h"
 #include "processing/normals/semi_calibrated.h"
 #include "processing/pipeline/radiance.h"
@@ -20,20 +21,6 @@ constexpr double clear_gain = 0.7;               // of the residual with equal l
 std::size_t used_lights(const Lights& lights) {
     return static_cast<std::size_t>(
         std::count_if(lights.begin(), lights.end(), [](const Light& light) { return light.used; }));
-}
-
-struct PlaneFrames {
-    std::vector<cv::Mat3f> frames;
-    std::vector<cv::Mat1b> clipped;
-};
-
-PlaneFrames read_plane(const Session& session, FrameKind kind, const WorkContext& work) {
-    PlaneFrames plane;
-    for (Radiance& radiance : read_radiances(session, photographs_of(session, kind), work)) {
-        plane.frames.push_back(std::move(radiance.image));
-        plane.clipped.push_back(std::move(radiance.clipped));
-    }
-    return plane;
 }
 
 /// The middle of the picture, where a flat field shows its plane.
@@ -78,10 +65,18 @@ Calibration with_measured_intensities(const Session& session, Calibration calibr
                                       const std::optional<GreyCard>& card, const WorkContext& work) {
     const bool flats = photographs_of(session, FrameKind::flat).size() == calibration.lights.size();
     if (!card && (!flats || calibration.intensity_origin != IntensityOrigin::unknown)) return calibration;
-    const PlaneFrames plane = read_plane(session, card ? FrameKind::lit : FrameKind::flat, work);
-    GreyCard area = card ? *card : middle_of(plane.frames.front().size());
-    area.view = calibration.view;
-    calibration.lights = with_intensities_of_card(plane.frames, plane.clipped, std::move(calibration.lights), area);
+    const std::vector<FrameRecord> frames = photographs_of(session, card ? FrameKind::lit : FrameKind::flat);
+    if (frames.size() != calibration.lights.size())
+        throw InputError(
+            fmt::format("{} frames of the grey card for {} lights", frames.size(), calibration.lights.size()),
+            "give one frame for each light");
+    for_radiances(session, frames, work, [&](std::size_t i, const Radiance& frame) {
+        Light& light = calibration.lights[i];
+        GreyCard area = card ? *card : middle_of(frame.image.size());
+        area.view = calibration.view;
+        if (light.used) light.intensity = intensity_on_card(frame.image, frame.clipped, light, area);
+    });
+    calibration.lights = with_mean_intensity_one(std::move(calibration.lights));
     calibration.intensity_origin = card ? IntensityOrigin::grey_card : IntensityOrigin::flat;
     for (std::string& words : weak_lamps(calibration.lights)) calibration.warnings.push_back(std::move(words));
     return calibration;

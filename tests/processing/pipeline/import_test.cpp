@@ -10,7 +10,7 @@
 #include "processing/formats/picture.h"
 #include "processing/formats/png.h"
 #include "processing/pipeline/export.h"
-#include "processing/pipeline/stack.h"
+#include "processing/pipeline/session_ball.h"
 #include "processing/pipeline/stages.h"
 #include "tests/processing/pipeline/synthetic_photographs.h"
 #include "tests/support/test_data.h"
@@ -131,7 +131,7 @@ TEST_F(Import, BallCaptureMustMatchFrameByFrame) {
     EXPECT_EQ(session.frames()[3].file, "frames/ball/b2.png");
     EXPECT_EQ(session.frames()[3].kind, FrameKind::ball);
     EXPECT_THAT(session.extras(), Contains("masks/ball_mask.png"));
-    EXPECT_EQ(load_ball_frames(session).files, (std::vector<std::string>{"1.png", "2.png"}));
+    EXPECT_EQ(SessionBall(session, {}).files(), (std::vector<std::string>{"1.png", "2.png"}));
 }
 
 TEST_F(Import, LightsOfAnotherCountAreRefused) {
