@@ -9,6 +9,7 @@
 #include "processing/pipeline/provenance.h"
 #include "processing/pipeline/session_files.h"
 #include "processing/pipeline/session_geometry.h"
+#include "processing/pipeline/shade_stage.h"
 #include "processing/pipeline/stages.h"
 #include "processing/pipeline/steps.h"
 #include "processing/pipeline/summary_json.h"
@@ -63,7 +64,13 @@ TexelsSummary run_texels(const Session& session, const TexelOptions& options, co
 }
 
 ShadeSummary run_shade(const Session& session, const ShadingOptions& options, const WorkContext& work) {
+    return run_shade(session, options, ShadingBands{}, work);
+}
+
+ShadeSummary run_shade(const Session& session, const ShadingOptions& options, const ShadingBands& bands,
+                       const WorkContext& work) {
     options.validate();
+    bands.validate();
     const ResultFiles files(session.folder());
     const Lights lights = load_lights(session);
     ShadeSummary summary;
@@ -76,7 +83,7 @@ ShadeSummary run_shade(const Session& session, const ShadingOptions& options, co
     ShadingOptions with_geometry = options;
     with_geometry.geometry = scene_geometry(files);
     const ShadingResult shaded =
-        shading_maps(photos, lights, maps.normals, maps.albedo, index, with_geometry, ShadingBands{}, work);
+        shading_maps(photos, lights, maps.normals, maps.albedo, index, with_geometry, bands, work);
     watch.lap();
     summary.seconds.solve = shaded.seconds;
     summary.texels = shaded.maps.texels;

@@ -9,7 +9,7 @@ namespace darkbox {
 struct ShadingBands {
     /// Photographs stay in memory as they were decoded where they and the maps fit into so much; else they are read
     /// three times, by bands of rows.
-    int memory_mib = 2048;
+    int memory_mib = 4096;
     int rows = 0;  ///< of a band; 0: as memory_mib allows. It does not change results.
 
     /// Throws InputError that names the field and the allowed range.
