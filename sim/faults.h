@@ -29,6 +29,8 @@ enum class FaultKind {
     nonlinear,      ///< signal x of full scale 1 becomes x + 4 * amount * x (1 - x): off by `amount` at half scale
     defocus,        ///< the picture is blurred by a Gaussian of `amount` pixels
     camera_knock,   ///< the picture lies `amount` pixels further right
+    warming,        ///< the black level is too high by `amount` of full scale at first, by half every 30 s
+    hot_lamps,      ///< the lamps' heat sink has `amount` degrees Celsius
     object_knock,   ///< what is not the mirror ball lies `amount` pixels further right
 };
 

@@ -13,6 +13,8 @@
 namespace darkbox::sim {
 namespace {
 
+constexpr double warming_half_s = 30;  ///< after which half of what a cold sensor is off by is gone
+
 constexpr FrameControls power_on_controls{Seconds{0.02}, 1.0};
 
 PixelFormat format_of(const Sensor& sensor) { return sensor.bit_depth > 8 ? PixelFormat::rgb16 : PixelFormat::rgb8; }
@@ -83,6 +85,7 @@ void SimCamera::start() {
     fail_while_unplugged();
     state_ = State::streaming;
     stream_start_ = clock_.now();
+    if (!first_start_) first_start_ = stream_start_;
     first_sequence_ = next_strobe_ = next_sequence_;
     queue_.clear();
     // Now, while nobody waits with a lamp lit: in real time the rendering takes longer than a lamp may be on.
@@ -207,12 +210,15 @@ Frame SimCamera::deliver(const Exposure& e) {
 
     Sensor sensor = options_.sensor;
     sensor.nonlinearity = faults.amount(FaultKind::nonlinear, picture.sequence).value_or(0.0);
+    if (const auto cold = faults.amount(FaultKind::warming, picture.sequence))
+        sensor.black_level += *cold * sensor.full_scale() *
+                              std::exp2(-to_seconds(picture.interval.begin - *first_start_) / warming_half_s);
     Frame frame;
     frame.width = scene_.view.width;
     frame.height = scene_.view.height;
     frame.format = format_of(sensor);
     frame.bit_depth = sensor.bit_depth;
-    frame.black_level = sensor.black_level;
+    frame.black_level = options_.sensor.black_level;
     frame.pixels = as_bytes(expose(sensor, seen(light_of(burning), picture.sequence),
                                    {picture.controls.exposure.count(), picture.controls.gain, picture.sequence}),
                             frame.format);

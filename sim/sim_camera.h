@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <optional>
 #include <vector>
 
 #include "acquisition/camera/camera.h"
@@ -81,9 +82,10 @@ private:
     FrameControls controls_before_;  ///< in effect for the first frames after start()
     Nanoseconds period_{0};
     TimePoint stream_start_;
-    std::uint64_t first_sequence_ = 0;  ///< of this stream
-    std::uint64_t next_sequence_ = 0;   ///< to be exposed
-    std::uint64_t next_strobe_ = 0;     ///< the frame whose end of exposure is not told yet
+    std::optional<TimePoint> first_start_;  ///< when it began to get warm
+    std::uint64_t first_sequence_ = 0;      ///< of this stream
+    std::uint64_t next_sequence_ = 0;       ///< to be exposed
+    std::uint64_t next_strobe_ = 0;         ///< the frame whose end of exposure is not told yet
     std::deque<Exposure> queue_;
     std::vector<std::uint64_t>
         waits_hung_;  ///< for each fault of the plan; of an unplugged camera: calls that failed, and starts

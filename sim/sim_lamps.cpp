@@ -54,6 +54,11 @@ void SimLamps::light(LampId lamp, double level) {
     command(clock_.now(), {{lamp, level}});
 }
 
+LampHealth SimLamps::health() {
+    constexpr double room_c = 24;
+    return {.temperature_c = faults_.amount(FaultKind::hot_lamps, switches()).value_or(room_c)};
+}
+
 void SimLamps::dark() {
     catch_up();
     next_step_ = program_.size();

@@ -22,7 +22,7 @@ public:
     std::size_t size() const override { return count_; }
     void light(LampId lamp, double level) override;
     void dark() override;
-    LampHealth health() override { return {}; }
+    LampHealth health() override;
     StrobedLamps* strobed() override { return this; }
     void arm(const std::vector<StrobeStep>& program, Nanoseconds exposed) override;
     std::vector<StrobeEvent> take_events() override;

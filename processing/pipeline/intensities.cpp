@@ -30,15 +30,17 @@ GreyCard middle_of(cv::Size size) {
     return card;
 }
 
-SemiCalibratedResult estimated_from(const PhotoStack& stack, Lights lights, const WorkContext& work) {
+SemiCalibratedResult estimated_from(const PhotoStack& stack, Lights lights, const SemiCalibratedOptions& options,
+                                    const WorkContext& work) {
     for (Light& light : lights) light.intensity.setOnes();
-    return estimate_intensities(stack, lights, {}, work);
+    return estimate_intensities(stack, lights, options, work);
 }
 
 /// None where the photographs leave intensities open: nobody asked for them.
-std::optional<SemiCalibratedResult> tried_on(const PhotoStack& stack, const Lights& lights, const WorkContext& work) {
+std::optional<SemiCalibratedResult> tried_on(const PhotoStack& stack, const Lights& lights,
+                                             const SemiCalibratedOptions& options, const WorkContext& work) {
     try {
-        return estimated_from(stack, lights, work);
+        return estimated_from(stack, lights, options, work);
     } catch (const InputError&) {
         return std::nullopt;
     }
@@ -83,17 +85,20 @@ Calibration with_measured_intensities(const Session& session, Calibration calibr
 }
 
 ChosenIntensities choose_intensities(const PhotoStack& stack, Calibration calibration, IntensityChoice choice,
-                                     const WorkContext& work) {
+                                     const SceneGeometry& geometry, int row_step, const WorkContext& work) {
     const bool known = calibration.intensity_origin != IntensityOrigin::unknown;
     const bool few = used_lights(calibration.lights) < fewest_for_automatic;
     if (choice == IntensityChoice::given || (choice == IntensityChoice::automatic && (known || few)))
         return {std::move(calibration), false, {}};
     step(work, {"estimating intensities", 0, 1, ""});
+    SemiCalibratedOptions options;
+    options.geometry = geometry;
+    options.row_step = row_step;
     if (choice == IntensityChoice::estimate) {
-        SemiCalibratedResult result = estimated_from(stack, calibration.lights, work);
+        SemiCalibratedResult result = estimated_from(stack, calibration.lights, options, work);
         return adopted(std::move(calibration), std::move(result));
     }
-    auto result = tried_on(stack, calibration.lights, work);
+    auto result = tried_on(stack, calibration.lights, options, work);
     if (!result || !(result->residual < clear_gain * result->residual_equal))
         return {std::move(calibration), false, {}};
     return adopted(std::move(calibration), std::move(*result));

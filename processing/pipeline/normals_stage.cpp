@@ -94,9 +94,9 @@ HeightFacts write_surface(const ResultFiles& files, const PhotometricStereoResul
 }
 
 /// Near lights and near cameras need to know where each pixel lies: first in the plane z = 0, then on the surface that
-/// the last normals gave.
+/// the last normals gave, which is left in `options`.
 PhotometricStereoResult solve_normals(SessionPhotos& photos, const Calibration& calibration,
-                                      PhotometricStereoOptions options, const WorkContext& work) {
+                                      PhotometricStereoOptions& options, const WorkContext& work) {
     options.geometry.view = calibration.view;
     PhotometricStereoResult solved = photometric_stereo(photos, calibration.lights, options, work);
     const bool near = std::any_of(calibration.lights.begin(), calibration.lights.end(),
@@ -168,7 +168,8 @@ SolvedSession solve_session(SessionPhotos& photos, const fs::path& calibration_f
     StoredCalibration stored = read_calibration(calibration_file);
     require_solvable(stored.calibration.lights);
     SolvedSession solved;
-    solved.stereo = solve_normals(photos, stored.calibration, options.stereo, work);
+    PhotometricStereoOptions stereo = options.stereo;
+    solved.stereo = solve_normals(photos, stored.calibration, stereo, work);
     solved.solve_seconds = solved.stereo.seconds;
     const PhotoStack kept = photos.kept_stack();
     require_any_normal(solved.stereo, kept);
@@ -177,14 +178,16 @@ SolvedSession solve_session(SessionPhotos& photos, const fs::path& calibration_f
     solved.warnings = leave_out_black(tally, kept, stored.calibration.lights);
     const bool fewer = !solved.warnings.empty();
     Stopwatch watch;
-    ChosenIntensities chosen = choose_intensities(kept, std::move(stored.calibration), options.intensities, work);
+    ChosenIntensities chosen = choose_intensities(kept, std::move(stored.calibration), options.intensities,
+                                                  stereo.geometry, photos.kept_row_step(), work);
     solved.intensity_seconds = watch.lap();
     solved.calibration = std::move(chosen.calibration);
     append(solved.warnings, std::move(chosen.warnings));
     if (chosen.changed || fewer) {
         write_calibration(calibration_file, solved.calibration, stored.rig);
         photos.rewind();
-        solved.stereo = solve_normals(photos, solved.calibration, options.stereo, work);
+        stereo = options.stereo;
+        solved.stereo = solve_normals(photos, solved.calibration, stereo, work);
         solved.solve_seconds += solved.stereo.seconds;
     }
     append(solved.warnings, tally.warnings(solved.calibration.lights));

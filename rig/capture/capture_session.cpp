@@ -259,6 +259,7 @@ CapturedSession capture_session(const CaptureRequest& request, const RigDescript
     {
         SessionRecorder recorder(begun.writer);
         ToldSink told(recorder, request.listener);
+        for (const std::string& note : request.notes) told.note_event(note);
         summary = take_shots(begun, rig, devices, told, work, timings);
         recorder.finish();
     }

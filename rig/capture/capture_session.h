@@ -31,6 +31,7 @@ struct CaptureRequest {
     std::optional<std::filesystem::path> retake = {};
     ObjectRecord record = {};  ///< of the object; a resumed session keeps its own
     CaptureListener listener = {};
+    std::vector<std::string> notes = {};  ///< what the session is to keep of how it began
 };
 
 struct CapturedSession {

@@ -30,8 +30,9 @@ public:
     /// Forgets the rhythm: the camera was started anew.
     void restart();
 
-    /// There is a rhythm to predict by.
-    bool locked() const { return places_.size() >= wanted_places; }
+    /// There is a rhythm to predict by. A camera whose stamps are half a period or more off a straight line has none:
+    /// it delivers when it can, or slower than it says.
+    bool locked() const { return places_.size() >= wanted_places && 2 * worst_off_ < nominal_period_; }
     Nanoseconds period() const { return Nanoseconds(static_cast<Nanoseconds::rep>(period_)); }
     /// How far an exposure may lie from where it is predicted.
     Nanoseconds margin() const;

@@ -22,6 +22,11 @@ constexpr std::size_t pictures_kept = 40;
 /// A stamp may be late, and the exposure seem to end that much later: this part of a period.
 constexpr int late_stamps = 20;
 
+[[noreturn]] void throw_none_began(int frames) {
+    throw DeadlineError(fmt::format("{} frames came, none of which began after the lamp was steady", frames),
+                        "raise frame_deadline_s of [capture] for a slow camera, or check its timestamps");
+}
+
 constexpr const char* damaged_hint = "check the camera's cable and the load on its bus";
 
 bool near(double a, double b) { return std::abs(a - b) <= control_tolerance * std::max(std::abs(a), std::abs(b)); }
@@ -108,6 +113,15 @@ Frame FrameSource::next(TimePoint deadline) {
     }
 }
 
+/// A camera that delivers too slowly is not one that hangs, and its user needs to know which.
+Frame FrameSource::next_of_several(TimePoint deadline, int passed_over) {
+    try {
+        return next(deadline);
+    } catch (const DeadlineError&) {
+        throw_none_began(passed_over);
+    }
+}
+
 void FrameSource::check_order(const Frame& frame, const Place& before) const {
     if (before.sequence && frame.sequence <= *before.sequence)
         throw DamagedFrame(
@@ -182,8 +196,8 @@ void FrameSource::note_picture(const Frame& frame) {
 Frame FrameSource::first_after(TimePoint earliest, TimePoint deadline) {
     const TimePoint begin = clock_.now();
     passed_over_.reset();
-    while (true) {
-        Frame frame = next(deadline);
+    for (int passed_over = 0;; ++passed_over) {
+        Frame frame = passed_over == 0 ? next(deadline) : next_of_several(deadline, passed_over);
         const Place before = take_in(frame);
         lost_ += lost_while_waiting(frame, before, begin);
         const Nanoseconds margin = rhythm_.locked() ? rhythm_.margin() : Nanoseconds(0);
@@ -194,9 +208,7 @@ Frame FrameSource::first_after(TimePoint earliest, TimePoint deadline) {
             if (passed_over_ && passed_over_->sequence + 1 != frame.sequence) passed_over_.reset();
             return frame;
         }
-        if (clock_.now() >= deadline)
-            throw DeadlineError("no frame began after the lamp was steady",
-                                "raise frame_deadline_s of [capture], or check the camera's timestamps");
+        if (clock_.now() >= deadline) throw_none_began(passed_over + 1);
         passed_over_ = std::move(frame);
     }
 }

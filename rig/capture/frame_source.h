@@ -75,6 +75,7 @@ private:
     };
 
     Frame next(TimePoint deadline);
+    Frame next_of_several(TimePoint deadline, int passed_over);
     /// Its place in the stream is noted, its exposure is the one measured.
     Place take_in(Frame& frame);
     /// New controls take some exposures to come into effect: a frame of before, which is no fault.

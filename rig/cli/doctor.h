@@ -41,6 +41,13 @@ struct LampBoardSeen {
     std::string serial = {};
 };
 
+/// A USB device of the rig that the kernel may or may not put to sleep.
+struct UsbPowerSeen {
+    std::string what;              ///< "camera", "lamp controller"
+    std::filesystem::path device;  ///< below /sys
+    bool may_sleep = false;
+};
+
 /// What the machine shows, gathered apart from what is made of it.
 struct MachineSeen {
     std::string user;
@@ -53,6 +60,7 @@ struct MachineSeen {
     std::vector<LampBoardSeen> boards = {};
     bool lamp_rules = false;                     ///< udev's, for lamp controllers
     std::optional<double> camera_bus_mbit = {};  ///< a second; none: not known, or no USB camera
+    std::vector<UsbPowerSeen> usb_power = {};
 };
 MachineSeen look_at_machine(const RigDescription& rig);
 
@@ -63,11 +71,14 @@ Diagnoses diagnose_usb_lamps(const RigDescription& rig, const MachineSeen& machi
 /// Whether the camera's USB carries what its mode sends; nothing where either is not known.
 Diagnoses diagnose_camera_bus(const RigDescription& rig, const MachineSeen& machine);
 
+/// Whether the kernel leaves the rig's USB devices awake; nothing where there are none.
+Diagnoses diagnose_usb_power(const MachineSeen& machine);
+
 /// The remedy for a device that its group may use and this user may not.
 std::string join_group(const MachineSeen& machine, const std::string& group);
 
-/// The lamp controllers and the camera's bus, as sysfs shows them.
-void look_at_usb(const RigDescription& rig, MachineSeen& machine);
+/// The lamp controllers, the camera's bus and what may sleep, as sysfs shows them.
+void look_at_usb(const RigDescription& rig, MachineSeen& machine, const std::filesystem::path& sys = "/sys");
 
 /// What the camera sends at its rate, in megabytes a second; 0 where the description leaves it open.
 double camera_megabytes_per_second(const RigDescription& rig);

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <chrono>
+
 #include <memory>
 
 #include "acquisition/frame/error.h"
@@ -32,7 +34,23 @@ const char* word(Verdict verdict) {
 
 Diagnosis diagnose_daemon() {
     const auto socket = known_socket();
-    if (socket && DaemonClient(*socket).answers()) return {"darkboxd", Verdict::good, "answers at " + socket->string()};
+    if (socket && DaemonClient(*socket).answers()) {
+        // systemd holds the socket: that somebody listens does not mean that darkboxd gets up.
+        try {
+            const auto status = DaemonClient(*socket, std::chrono::seconds(5)).call("GET", "status");
+            const std::string state = status.at("state");
+            if (state == "Idle" || state == "Busy")
+                return {"darkboxd", Verdict::good, fmt::format("answers at {}: {}", socket->string(), state)};
+            return {"darkboxd", Verdict::warning,
+                    fmt::format("is {}: {}", state, status.value("problem", std::string("it opens the rig"))),
+                    state == "Fault" ? "look at the lamps, then: darkbox lamps dark"
+                                     : "put right what it says; it tries again by itself"};
+        } catch (const Error& error) {
+            return {"darkboxd", Verdict::bad, error.what(),
+                    "journalctl -u darkboxd says why it does not start; then sudo systemctl restart darkboxd.socket "
+                    "darkboxd"};
+        }
+    }
     return {"darkboxd", Verdict::warning, "does not answer",
             "sudo systemctl start darkboxd (journalctl -u darkboxd says why it ended), or darkboxd --config rig.toml"};
 }
@@ -48,6 +66,7 @@ Diagnoses diagnose(const DoctorArguments& a) {
         take(diagnose_camera(rig, machine));
         take(diagnose_camera_bus(rig, machine));
         take(diagnose_lamps(rig, machine));
+        take(diagnose_usb_power(machine));
         const fs::path sessions = !a.sessions.empty()            ? a.sessions
                                   : !rig.sessions_folder.empty() ? rig.sessions_folder
                                                                  : default_sessions_folder();

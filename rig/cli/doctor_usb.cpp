@@ -36,34 +36,64 @@ LampBoardSeen board_at(const fs::path& device) {
     return board;
 }
 
-/// The speed of the USB device above a camera's node.
-std::optional<double> bus_of(const fs::path& camera) {
+/// The USB device above a camera's node; empty for a camera that is none.
+fs::path usb_device_of(const fs::path& camera, const fs::path& sys) {
     std::error_code error;
     const fs::path node = fs::canonical(camera, error);
-    if (error) return std::nullopt;
-    fs::path device = fs::canonical(fs::path("/sys/class/video4linux") / node.filename() / "device", error);
-    for (; !error && device.has_relative_path(); device = device.parent_path()) {
-        const std::string speed = word_of(device / "speed");
-        if (fs::exists(device / "idVendor", error) && !speed.empty()) return std::atof(speed.c_str());
-    }
-    return std::nullopt;
+    if (error) return {};
+    fs::path device = fs::canonical(sys / "class/video4linux" / node.filename() / "device", error);
+    for (; !error && device.has_relative_path(); device = device.parent_path())
+        if (fs::exists(device / "idVendor", error)) return device;
+    return {};
+}
+
+/// "auto" lets the kernel put it to sleep when nobody uses it; a delay below 0 forbids it all the same.
+void look_at_power(const std::string& what, const fs::path& device, MachineSeen& machine) {
+    const std::string delay = word_of(device / "power/autosuspend_delay_ms");
+    const bool may_sleep = word_of(device / "power/control") == "auto" && !delay.starts_with('-');
+    machine.usb_power.push_back({what, device, may_sleep});
 }
 
 }  // namespace
 
-void look_at_usb(const RigDescription& rig, MachineSeen& machine) {
+void look_at_usb(const RigDescription& rig, MachineSeen& machine, const fs::path& sys) {
     const std::string vendor = fmt::format("{:04x}", lamp_protocol::vendor_id);
     const std::string product = fmt::format("{:04x}", lamp_protocol::product_id);
     std::error_code none;
-    for (const auto& entry : fs::directory_iterator("/sys/bus/usb/devices", none))
-        if (word_of(entry.path() / "idVendor") == vendor && word_of(entry.path() / "idProduct") == product &&
-            word_of(entry.path() / "product") == "darkbox")
-            machine.boards.push_back(board_at(entry.path()));
+    for (const auto& entry : fs::directory_iterator(sys / "bus/usb/devices", none)) {
+        if (word_of(entry.path() / "idVendor") != vendor || word_of(entry.path() / "idProduct") != product ||
+            word_of(entry.path() / "product") != "darkbox")
+            continue;
+        machine.boards.push_back(board_at(entry.path()));
+        if (rig.lamps_driver == "usb") look_at_power("lamp controller", entry.path(), machine);
+    }
     for (const char* folder : {"/lib/udev/rules.d", "/etc/udev/rules.d"})
         machine.lamp_rules = machine.lamp_rules || fs::exists(fs::path(folder) / "70-darkbox-lamps.rules");
     const fs::path given = rig.camera.device;
-    if (rig.camera.driver == "v4l2")
-        machine.camera_bus_mbit = bus_of(given.is_absolute() ? given : fs::path("/dev/v4l/by-id") / given);
+    if (rig.camera.driver != "v4l2") return;
+    const fs::path camera = usb_device_of(given.is_absolute() ? given : fs::path("/dev/v4l/by-id") / given, sys);
+    if (camera.empty()) return;
+    if (const std::string speed = word_of(camera / "speed"); !speed.empty())
+        machine.camera_bus_mbit = std::atof(speed.c_str());
+    look_at_power("camera", camera, machine);
+}
+
+Diagnoses diagnose_usb_power(const MachineSeen& machine) {
+    Diagnoses all;
+    for (const UsbPowerSeen& seen : machine.usb_power) {
+        const std::string subject = seen.what + "'s power";
+        if (!seen.may_sleep) {
+            all.push_back({subject, Verdict::good, "it is kept awake"});
+            continue;
+        }
+        const std::string now = fmt::format("echo on | sudo tee {}/power/control", seen.device.string());
+        all.push_back({subject, Verdict::warning,
+                       "the kernel may put it to sleep between captures (autosuspend), and it wakes up cold",
+                       machine.udev_rules
+                           ? now + "; for good: sudo udevadm trigger --action=add, which applies darkbox' udev rules"
+                           : now + "; for good: install darkbox-daemon, whose udev rules do so when it is plugged in"});
+    }
+    return all;
 }
 
 Diagnoses diagnose_usb_lamps(const RigDescription& rig, const MachineSeen& machine) {

@@ -22,6 +22,8 @@ namespace fs = std::filesystem;
 using namespace lamp_protocol;
 
 constexpr auto restart_patience = std::chrono::seconds(15);
+/// Where somebody has to press a button first.
+constexpr auto reset_patience = std::chrono::seconds(60);
 
 struct FlashArguments {
     fs::path image;
@@ -46,11 +48,17 @@ int run(const std::vector<std::string>& arguments) {
     pid_t child = 0;
     const int error = posix_spawnp(&child, words.front(), &actions, nullptr, words.data(), environ);
     posix_spawn_file_actions_destroy(&actions);
-    if (error != 0) throw_errno("starting", arguments.front(), error, "install it: apt-get install dfu-programmer");
+    if (error != 0)
+        throw_errno(
+            "starting", arguments.front(), error,
+            fmt::format("install it (apt-get install {}), or name another with --programmer", arguments.front()));
     int status = 0;
     if (waitpid(child, &status, 0) < 0) throw_errno("waiting for", arguments.front(), errno);
     return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
 }
+
+/// avrdude can write the chip through its loader, and cannot start what it wrote.
+bool starts_the_firmware(const FlashArguments& a) { return a.programmer != "avrdude"; }
 
 void program(const FlashArguments& a) {
     std::vector<std::vector<std::string>> steps;
@@ -104,7 +112,7 @@ bool enter_bootloader(const FlashArguments& a, const ImageMark& mark) {
 /// Waits for the flashed board; gives it an identity if it has none.
 CommandResult check_flashed(const FlashArguments& a, const ImageMark& mark) {
     UsbBus bus;
-    bus.open_within("", restart_patience);
+    bus.open_within("", starts_the_firmware(a) ? restart_patience : reset_patience);
     LampControllerOptions options;
     LampController board(options);
     const Info info = board.info();
@@ -140,6 +148,8 @@ CommandResult flash(const FlashArguments& a) {
     wanted_identity(a);
     enter_bootloader(a, image.mark);
     program(a);
+    if (!starts_the_firmware(a))
+        fmt::print(stderr, "flashed; now press the board's reset button, or plug it in again\n");
     return check_flashed(a, image.mark);
 }
 

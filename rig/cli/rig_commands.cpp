@@ -52,6 +52,10 @@ CommandResult rig_status(const RigArguments& a, const WorkContext&) {
         fmt::format("{}: {}, {} lamps, darkboxd {}", result.json.at("rig").get<std::string>(),
                     result.json.at("state").get<std::string>(), result.json.at("lamps").at("count").get<int>(),
                     result.json.at("version").get<std::string>());
+    const Json& lamps = result.json.at("lamps");
+    if (lamps.contains("temperature_c"))
+        result.text += fmt::format("\nlamps: {:.0f} degrees Celsius", lamps.at("temperature_c").get<double>());
+    for (const Json& problem : lamps.at("problems")) result.warnings.push_back(problem);
     if (result.json.contains("running")) {
         const Json& job = result.json.at("running");
         result.text += fmt::format("\ncapturing {}: {} of {}", job.at("session").get<std::string>(),

@@ -56,7 +56,8 @@ std::string describe(const CalibrateSummary& summary) {
     const auto near = std::count_if(c.lights.begin(), c.lights.end(), [](const Light& light) { return light.near; });
     if (near > 0) text += fmt::format("\n{} lamps are near: their places are known in mm", near);
     for (const Ball& ball : c.balls)
-        text += fmt::format("\nball at ({:.1f}, {:.1f}), radius {:.1f} px", ball.x, ball.y, ball.radius);
+        text += fmt::format("\nball at ({:.1f}, {:.1f}), radius {:.1f} px, confidence {:.2f}", ball.x, ball.y,
+                            ball.radius, ball.confidence);
     return text + what_went(summary.removed, "lights");
 }
 

@@ -33,8 +33,15 @@ std::string lower(std::string text) {
     return text;
 }
 
+/// "*.lab.example:7640" stands for one more part before the first dot, never for several.
+bool covers(const std::string& own, const std::string& host) {
+    if (!own.starts_with("*.")) return own == host;
+    const auto dot = host.find('.');
+    return dot != host.npos && dot > 0 && std::string_view(host).substr(dot) == std::string_view(own).substr(1);
+}
+
 bool is_own(const TcpAccess& access, const std::string& host) {
-    return std::ranges::find(access.hosts, lower(host)) != access.hosts.end();
+    return std::ranges::any_of(access.hosts, [host = lower(host)](const auto& own) { return covers(own, host); });
 }
 
 /// As a header, or among the WebSocket's protocols.
@@ -78,15 +85,26 @@ bool is_member(uid_t user, gid_t group) {
 
 }  // namespace
 
-std::vector<std::string> own_hosts(const std::string& address, unsigned short port) {
-    const std::string literal = address.find(':') == address.npos ? address : "[" + address + "]";
-    return {fmt::format("{}:{}", literal, port), fmt::format("localhost:{}", port)};
+std::vector<std::string> own_hosts(const std::string& address, unsigned short port,
+                                   const std::vector<std::string>& names) {
+    std::vector<std::string> own{address, "localhost"};
+    own.insert(own.end(), names.begin(), names.end());
+    for (std::string& host : own) {
+        if (host.find(':') != host.npos) host = fmt::format("[{}]", host);
+    }
+    constexpr unsigned short port_of_https = 443;  // which browsers leave out
+    const std::size_t count = own.size();
+    for (std::size_t i = 0; i < count; ++i) {
+        if (port == port_of_https) own.push_back(own[i]);
+        own[i] += fmt::format(":{}", port);
+    }
+    return own;
 }
 
 std::optional<ApiResponse> refuse(const TcpAccess& access, const Credentials& given) {
     if (!is_own(access, given.host))
         return problem(421, "the request is for another host", "use the address that darkboxd listens on");
-    constexpr std::string_view scheme = "http://";
+    const std::string_view scheme = access.tls ? "https://" : "http://";
     if (!given.origin.empty() &&
         (!given.origin.starts_with(scheme) || !is_own(access, given.origin.substr(scheme.size()))))
         return problem(403, "the request comes from a page of another site", "use darkbox's own page");

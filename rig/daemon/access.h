@@ -14,11 +14,14 @@ namespace darkbox {
 /// Who may come in by TCP: whoever has the token, from a program, or from a page that this daemon's own address served.
 struct TcpAccess {
     std::string token;
-    std::vector<std::string> hosts;  ///< the values of Host (and of Origin, after "http://") that are this daemon
+    std::vector<std::string> hosts;  ///< the values of Host (and of Origin, after its scheme) that are this daemon
+    bool tls = false;                ///< pages come by https then
 };
 
-/// "127.0.0.1:7640" as people write it: the addresses under which a browser may reach it.
-std::vector<std::string> own_hosts(const std::string& address, unsigned short port);
+/// "127.0.0.1:7640" as people write it: the addresses under which a browser may reach it. Besides the address that it
+/// listens on, `names` are those of its certificate; "*.lab.example" is any name of one more part.
+std::vector<std::string> own_hosts(const std::string& address, unsigned short port,
+                                   const std::vector<std::string>& names = {});
 
 /// What a request says of who sends it.
 struct Credentials {

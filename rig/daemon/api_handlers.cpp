@@ -68,6 +68,9 @@ ApiResponse Api::status(const Call&) const {
               {"queued", status.queued},
               {"processing", status.processing},
               {"last_event", status.last_event}};
+    json["lamps"]["reachable"] = status.lamps.reachable;
+    json["lamps"]["problems"] = status.lamps.problems;
+    if (status.lamps.temperature_c) json["lamps"]["temperature_c"] = *status.lamps.temperature_c;
     if (!status.problem.empty()) json["problem"] = status.problem;
     if (status.running) json["running"] = to_json(*status.running);
     return reply(json);

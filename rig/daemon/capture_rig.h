@@ -7,6 +7,7 @@
 #include "acquisition/frame/units.h"
 #include "rig/capture/capture_session.h"
 #include "rig/description/rig_description.h"
+#include "rig/lamps/lamp_array.h"
 
 namespace darkbox {
 
@@ -30,6 +31,8 @@ public:
     virtual void lend(const std::function<void(const CaptureDevices&)>& work) = 0;
     /// Throws DeviceError when darkness cannot be confirmed.
     virtual void dark() = 0;
+    /// The lamps', while nothing is captured.
+    virtual LampHealth health() { return {}; }
 };
 
 using OpenRig = std::function<std::unique_ptr<CaptureRig>()>;

@@ -13,6 +13,12 @@ using Response = http::response<http::string_body>;
 
 constexpr std::size_t file_piece = 256 * 1024;  ///< bytes
 
+/// What is begun on the stream from now on fails when it takes longer.
+template <typename Stream>
+void deadline_of(Stream& stream, std::chrono::milliseconds longest) {
+    beast::get_lowest_layer(stream).expires_after(longest);
+}
+
 template <typename Fields>
 void set_fields(Fields& fields, const ApiResponse& answer) {
     fields.set(http::field::server, "darkboxd");
@@ -59,7 +65,8 @@ ApiResponse refusal(const error_code& error) {
 }
 
 /// By TCP, who asks must show that they may, and not ask too often.
-std::optional<ApiResponse> turned_away(Shared& shared, const TcpStream&, const Request& request) {
+template <typename Stream>
+std::optional<ApiResponse> turned_away(Shared& shared, const Stream&, const Request& request) {
     if (!shared.rate.take(RateLimit::Clock::now())) {
         ApiResponse busy = problem(429, "too many requests", "ask less often");
         busy.headers.emplace_back("Retry-After", "1");
@@ -73,7 +80,7 @@ template <typename Stream>
 Task<bool> send(Shared& shared, Stream& stream, const ApiResponse& answer, bool keep_alive) {
     const Response response = make_response(answer, keep_alive);
     error_code error;
-    stream.expires_after(shared.options.deadline);
+    deadline_of(stream, shared.options.deadline);
     co_await http::async_write(stream, response, into(error));
     co_return !error && keep_alive;
 }
@@ -94,12 +101,12 @@ Task<bool> send_file(Shared& shared, Stream& stream, const ApiResponse& answer, 
     head.keep_alive(keep_alive);
     http::response_serializer<http::empty_body> serializer(head);
     error_code error;
-    stream.expires_after(shared.options.deadline);
+    deadline_of(stream, shared.options.deadline);
     co_await http::async_write_header(stream, serializer, into(error));
     for (std::uint64_t done = 0; !error && done < answer.file->length;) {
         const std::string piece = co_await on_worker(shared, [&] { return read_piece(*answer.file, done); });
         if (piece.empty()) co_return false;  // the length was promised: all that is left is to hang up
-        stream.expires_after(shared.options.deadline);
+        deadline_of(stream, shared.options.deadline);
         co_await asio::async_write(stream, asio::buffer(piece), into(error));
         done += piece.size();
     }
@@ -114,7 +121,7 @@ Task<> stream_events(Shared& shared, Stream& stream, const ApiResponse& answer) 
     head.keep_alive(false);
     http::response_serializer<http::empty_body> serializer(head);
     error_code error;
-    stream.expires_after(shared.options.deadline);
+    deadline_of(stream, shared.options.deadline);
     co_await http::async_write_header(stream, serializer, into(error));
     std::uint64_t number = *answer.stream_events;
     while (!error) {
@@ -122,7 +129,7 @@ Task<> stream_events(Shared& shared, Stream& stream, const ApiResponse& answer) 
         if (events.empty() && shared.log.closed()) break;
         std::string text = events.empty() ? "\n" : "";
         for (const Event& event : events) text += event.json + "\n";
-        stream.expires_after(shared.options.deadline);
+        deadline_of(stream, shared.options.deadline);
         co_await asio::async_write(stream, http::make_chunk(asio::buffer(text)), into(error));
     }
     if (!error) co_await asio::async_write(stream, http::make_chunk_last(), into(error));
@@ -167,9 +174,9 @@ Task<bool> serve_one(Shared& shared, Stream& stream, beast::flat_buffer& buffer)
     parser.body_limit(shared.options.body_limit);
     error_code error;
     {
-        std::function<void()> cancel = [&stream] { stream.cancel(); };
+        std::function<void()> cancel = [&stream] { beast::get_lowest_layer(stream).cancel(); };
         const Listed listed(shared.reading, cancel);
-        stream.expires_after(shared.options.deadline);
+        deadline_of(stream, shared.options.deadline);
         co_await http::async_read(stream, buffer, parser, into(error));
     }
     if (error == http::error::end_of_stream || error == beast::error::timeout ||
@@ -181,35 +188,59 @@ Task<bool> serve_one(Shared& shared, Stream& stream, beast::flat_buffer& buffer)
 
 class Counted {
 public:
-    explicit Counted(Shared& shared) : shared_(shared) {
-        ++shared_.connections;
+    Counted(Shared& shared, std::size_t& count) : shared_(shared), count_(count) {
+        ++count_;
         shared_.metrics.connection_opened();
     }
     Counted(const Counted&) = delete;
     Counted& operator=(const Counted&) = delete;
     ~Counted() {
-        --shared_.connections;
+        --count_;
         shared_.metrics.connection_closed();
     }
 
 private:
     Shared& shared_;
+    std::size_t& count_;
 };
 
+/// Requests one after the other; all the others' connections are counted by `count`.
 template <typename Stream>
-Task<> serve_stream(std::shared_ptr<Shared> shared, Stream stream) {
-    const Counted counted(*shared);
+Task<> serve_requests(Shared& shared, Stream& stream, std::size_t count) {
     beast::flat_buffer buffer;
-    if (shared->connections > shared->options.max_connections) {
-        shared->metrics.refused();
-        co_await send(*shared, stream, problem(503, "too many connections", "close one, or try again"), false);
+    if (count > shared.options.max_connections) {
+        shared.metrics.refused();
+        co_await send(shared, stream, problem(503, "too many connections", "close one, or try again"), false);
     } else {
-        while (co_await serve_one(*shared, stream, buffer)) {
+        while (co_await serve_one(shared, stream, buffer)) {
         }
     }
+}
+
+template <typename Stream>
+void hang_up(Stream& stream) {
     error_code ignored;
-    stream.socket().shutdown(asio::socket_base::shutdown_both, ignored);
-    stream.close();
+    auto& lowest = beast::get_lowest_layer(stream);
+    lowest.socket().shutdown(asio::socket_base::shutdown_both, ignored);
+    lowest.close();
+}
+
+/// Whether there is a stream now to speak HTTP on. A stranger may be slow: others do not wait for it.
+Task<bool> shake_hands(Shared& shared, TlsStream& stream) {
+    std::function<void()> cancel = [&stream] { beast::get_lowest_layer(stream).cancel(); };
+    const Listed listed(shared.reading, cancel);
+    error_code error;
+    deadline_of(stream, shared.options.deadline);
+    co_await stream.async_handshake(asio::ssl::stream_base::server, into(error));
+    if (error) shared.metrics.refused();
+    co_return !error;
+}
+
+/// Tells the other side that this was all (RFC 8446, section 6.1), so that nobody can cut an answer short unseen.
+Task<> say_goodbye(TlsStream& stream) {
+    error_code ignored;
+    deadline_of(stream, std::chrono::seconds(1));
+    co_await stream.async_shutdown(into(ignored));
 }
 
 }  // namespace
@@ -228,10 +259,22 @@ Task<std::vector<Event>> next_events(Shared& shared, std::uint64_t& number) {
 }
 
 Task<> serve(std::shared_ptr<Shared> shared, UnixStream stream) {
-    co_await serve_stream(std::move(shared), std::move(stream));
+    const Counted counted(*shared, shared->local_connections);
+    co_await serve_requests(*shared, stream, shared->local_connections);
+    hang_up(stream);
 }
 Task<> serve(std::shared_ptr<Shared> shared, TcpStream stream) {
-    co_await serve_stream(std::move(shared), std::move(stream));
+    const Counted counted(*shared, shared->tcp_connections);
+    co_await serve_requests(*shared, stream, shared->tcp_connections);
+    hang_up(stream);
+}
+Task<> serve(std::shared_ptr<Shared> shared, TlsStream stream) {
+    const Counted counted(*shared, shared->tcp_connections);
+    if (co_await shake_hands(*shared, stream)) {
+        co_await serve_requests(*shared, stream, shared->tcp_connections);
+        if (!shared->stopping) co_await say_goodbye(stream);
+    }
+    hang_up(stream);
 }
 
 }  // namespace darkbox

@@ -6,13 +6,13 @@
 #include <utility>
 
 #include "rig/daemon/http_server.h"
+#include "rig/daemon/tls_stream.h"
 
 namespace darkbox {
 
 using boost::system::error_code;
 template <typename T = void>
 using Task = asio::awaitable<T>;
-using TcpStream = beast::basic_stream<asio::ip::tcp, asio::any_io_executor, beast::unlimited_rate_policy>;
 
 inline auto into(error_code& error) { return asio::redirect_error(asio::use_awaitable, error); }
 
@@ -23,11 +23,15 @@ struct HttpServer::Shared {
     const Handler handler;
     EventLog& log;
     Metrics& metrics;
+    asio::ip::tcp::endpoint bound = {};  ///< what is listened on, by TCP
     std::optional<TcpAccess> tcp = {};
     RateLimit rate;
+    RateLimit handshakes;
+    std::optional<RenewedIdentity> identity = {};  ///< what TLS shows
     asio::thread_pool worker{4};  ///< runs the handler; several, so that a slow request does not hold up lamps/dark
     bool stopping = false;
-    std::size_t connections = 0;
+    std::size_t local_connections = 0;  ///< by the Unix socket
+    std::size_t tcp_connections = 0;
     std::set<std::function<void()>*> reading = {};  ///< what cancels those that wait for a request
     std::set<asio::steady_timer*> listening = {};   ///< waiting for an event
 };
@@ -57,14 +61,17 @@ Task<std::invoke_result_t<Work>> on_worker(HttpServer::Shared& shared, Work work
         asio::use_awaitable);
 }
 
-/// The life of one connection, on either kind of socket.
+/// The life of one connection, on any kind of socket.
 Task<> serve(std::shared_ptr<HttpServer::Shared> shared, UnixStream stream);
 Task<> serve(std::shared_ptr<HttpServer::Shared> shared, TcpStream stream);
+Task<> serve(std::shared_ptr<HttpServer::Shared> shared, TlsStream stream);
 
 /// Events through a WebSocket, until either side ends it. What the client says is answered by hanging up.
 Task<> serve_websocket(HttpServer::Shared& shared, UnixStream& stream, const http::request<http::string_body>& request,
                        std::uint64_t after);
 Task<> serve_websocket(HttpServer::Shared& shared, TcpStream& stream, const http::request<http::string_body>& request,
+                       std::uint64_t after);
+Task<> serve_websocket(HttpServer::Shared& shared, TlsStream& stream, const http::request<http::string_body>& request,
                        std::uint64_t after);
 
 }  // namespace darkbox

@@ -10,6 +10,7 @@
 #include "acquisition/frame/error.h"
 #include "rig/capture/interlock.h"
 #include "rig/capture/timing_store.h"
+#include "rig/daemon/readiness.h"
 #include "rig/lamps/gpio_lamps.h"
 #include "rig/lamps/usb_lamps.h"
 #include "sim/sim_rig.h"
@@ -42,16 +43,18 @@ void drive(const CaptureDevices& devices, Door* door, const std::function<void(c
     work({lamps, camera, devices.clock});
 }
 
-CaptureOutcome capture_with(const CaptureDevices& devices, Door* door, const CaptureRequest& request,
-                            const RigDescription& rig, const WorkContext& work) {
+CaptureOutcome capture_with(const CaptureDevices& devices, Door* door, CaptureRequest request,
+                            const RigDescription& rig, Readiness& readiness, const WorkContext& work) {
     const auto start = Stopwatch::now();
     CaptureOutcome outcome;
     drive(devices, door, [&](const CaptureDevices& d) {
+        readiness.require(rig, d, request, work);
         const auto [session, summary] = capture_session(request, rig, d.lamps, d.camera, d.clock, work, measured);
         outcome = {.session = session.folder(),
                    .frames = session.frames().size(),
                    .resumed = summary.resumed,
                    .repeated = summary.repeated};
+        readiness.used(d.clock.now());
     });
     outcome.duration = Stopwatch::now() - start;
     return outcome;
@@ -64,9 +67,10 @@ public:
         : rig_(rig), sim_(sim::SimRig::make(rig)), driven_(std::move(driven)) {}
 
     CaptureOutcome capture(const CaptureRequest& request, const WorkContext& work) override {
-        sim_ = sim::SimRig::make(rig_);  // its truth is of this capture alone
+        sim_ = sim::SimRig::make(rig_);  // its truth is of this capture alone, and its camera is cold
+        Readiness readiness(rig_.health);
         const CaptureOutcome outcome =
-            capture_with({lamps(), sim_.camera(), sim_.clock()}, door(), request, rig_, work);
+            capture_with({lamps(), sim_.camera(), sim_.clock()}, door(), request, rig_, readiness, work);
         write_truth(outcome.session);
         return outcome;
     }
@@ -77,6 +81,7 @@ public:
     }
 
     void dark() override { lamps().dark(); }
+    LampHealth health() override { return lamps().health(); }
 
 private:
     Door* door() { return rig_.door ? &sim_.door() : nullptr; }
@@ -113,7 +118,7 @@ public:
     }
 
     CaptureOutcome capture(const CaptureRequest& request, const WorkContext& work) override {
-        return capture_with({*lamps_, camera_, clock_}, door_.get(), request, rig_, work);
+        return capture_with({*lamps_, camera_, clock_}, door_.get(), request, rig_, readiness_, work);
     }
 
     void lend(const std::function<void(const CaptureDevices&)>& work) override {
@@ -122,9 +127,11 @@ public:
     }
 
     void dark() override { lamps_->dark(); }
+    LampHealth health() override { return lamps_->health(); }
 
 private:
     RigDescription rig_;
+    Readiness readiness_{rig_.health};
     SystemClock clock_;
     KernelVideoDevice device_;
     V4l2Camera camera_;

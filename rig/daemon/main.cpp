@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 #include <grp.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 
 #include <CLI/CLI.hpp>
 #include <charconv>
@@ -73,7 +75,7 @@ std::uint64_t capture_bytes(const RigDescription& rig, const CaptureOrder& order
 }
 
 /// "127.0.0.1:7640" or "[::1]:7640"
-TcpListen listen_from(const std::string& text, const fs::path& token_file) {
+TcpListen listen_from(const std::string& text) {
     const auto colon = text.rfind(':');
     TcpListen listen;
     unsigned port = 0;
@@ -85,8 +87,23 @@ TcpListen listen_from(const std::string& text, const fs::path& token_file) {
     if (listen.address.starts_with('[') && listen.address.ends_with(']'))
         listen.address = listen.address.substr(1, listen.address.size() - 2);
     listen.port = static_cast<unsigned short>(port);
-    listen.token = token_in(token_file);
     return listen;
+}
+
+std::string address_of(const HttpServer& server, bool tls) {
+    const std::string address = server.address();
+    const bool v6 = address.find(':') != address.npos;
+    return fmt::format("{}://{}{}{}:{}", tls ? "https" : "http", v6 ? "[" : "", address, v6 ? "]" : "", server.port());
+}
+
+/// Where the Unix socket is that systemd listens on.
+fs::path path_of(int listening) {
+    sockaddr_un bound{};
+    socklen_t size = sizeof bound;
+    if (::getsockname(listening, reinterpret_cast<sockaddr*>(&bound), &size) != 0 || bound.sun_path[0] == '\0')
+        throw InputError("the socket that systemd handed over has no path",
+                         "give darkboxd.socket a ListenStream=/run/...");
+    return bound.sun_path;
 }
 
 /// Everything the daemon is, wired together.
@@ -118,7 +135,7 @@ public:
     Daemon& operator=(const Daemon&) = delete;
     ~Daemon() { server_.release_handler(); }
 
-    unsigned short port() const { return server_.port(); }
+    const HttpServer& server() const { return server_; }
 
     void run() {
         notify_ready();
@@ -196,11 +213,19 @@ private:
 
 int run(const DaemonOptions& options) {
     const LogSink log = log_sink(log_level_from_name(options.log_level));
+    const InheritedSockets inherited = inherited_sockets();  // before anything forks
     RigDescription rig = load(options);
-    const fs::path socket = first_given(options.socket, rig.socket, default_socket);
+    const fs::path socket =
+        inherited.local ? path_of(*inherited.local) : first_given(options.socket, rig.socket, default_socket);
+    const fs::path asked = !options.socket.empty() ? options.socket : rig.socket;
+    if (inherited.local && !asked.empty() && asked != socket)
+        log({LogLevel::warning,
+             "listens where systemd does",
+             {{"socket", socket.string()}, {"not", asked.string()}, {"hint", "systemctl edit darkboxd.socket"}}});
     const fs::path sessions = first_given(options.sessions, rig.sessions_folder, default_sessions_folder);
     HttpServerOptions http;
     http.socket = socket;
+    http.listening = inherited.local;
     http.peers = peers_of(rig.socket_group);
     const std::string listen = options.listen.empty() ? rig.listen : options.listen;
     const fs::path token_file =
@@ -211,13 +236,18 @@ int run(const DaemonOptions& options) {
           {"lamps", std::to_string(rig.lamps.size())},
           {"socket", socket.string()},
           {"sessions", sessions.string()}}});
-    if (!listen.empty()) http.tcp = listen_from(listen, token_file);
+    if (!listen.empty()) http.tcp = listen_from(listen);
+    if (inherited.tcp) http.tcp = TcpListen{.listening = inherited.tcp};
+    if (http.tcp) {
+        http.tcp->token = token_in(token_file);
+        if (!rig.certificate.empty()) http.tcp->tls = TlsFiles{.certificate = rig.certificate, .key = rig.key};
+    }
     const auto not_dark = [&] {
         Daemon daemon(std::move(rig), http, sessions, log);
         if (http.tcp)
             log({LogLevel::info,
                  "listening",
-                 {{"address", fmt::format("http://{}:{}", http.tcp->address, daemon.port())},
+                 {{"address", address_of(daemon.server(), http.tcp->tls.has_value())},
                   {"token_file", token_file.string()}}});
         daemon.run();
         return daemon.stop();
@@ -241,8 +271,10 @@ int parse_and_run(int argc, char** argv) {
                    "Where to listen; else [api] socket, $DARKBOX_SOCKET, $XDG_RUNTIME_DIR/darkbox.sock");
     app.add_option("--sessions", options.sessions,
                    "The folder of the sessions; else [api] sessions, $DARKBOX_SESSIONS, ./sessions");
-    app.add_option("--listen", options.listen,
-                   "Listen on this loopback address, too (127.0.0.1:7640), for who has the token; else [api] listen");
+    app.add_option(
+        "--listen", options.listen,
+        "Listen on this address, too (127.0.0.1:7640), for who has the token; else [api] listen. Loopback only, "
+        "unless [api] names a certificate and a key");
     app.add_option("--log-level", options.log_level, "error, warning, notice, info (default) or debug");
     app.footer("Example:\n  darkboxd --simulate --lamps 12 --socket /tmp/darkbox.sock --sessions ./sessions");
     try {

@@ -63,6 +63,10 @@ std::string Metrics::text(Service& service) const {
     for (const auto& [key, count] : jobs)
         text += fmt::format("darkbox_jobs_total{{kind=\"{}\",state=\"{}\"}} {}\n", name(key.first), name(key.second),
                             count);
+    text += one("darkbox_lamps_reachable", "gauge", "1 while the lamps answer", status.lamps.reachable ? 1 : 0);
+    if (status.lamps.temperature_c)
+        text +=
+            one("darkbox_lamps_temperature_celsius", "gauge", "Of the lamps' heat sink", *status.lamps.temperature_c);
     text += one("darkbox_captures_queued", "gauge", "Captures that wait for the rig", status.queued);
     text += one("darkbox_processing_jobs", "gauge", "Processing jobs, running or waiting", status.processing);
     text += one("darkbox_frames_total", "counter", "Frames of captures that ended", service.frames_captured());
@@ -79,6 +83,9 @@ std::string Metrics::text(Service& service) const {
                 refused_.load());
     text += one("darkbox_http_connections", "gauge", "Open connections", connections_.load());
     text += one("darkbox_event_listeners", "gauge", "Connections that listen to events", listeners_.load());
+    if (const auto expires = certificate_expires_.load(); expires != 0)
+        text += one("darkbox_tls_certificate_expires_seconds", "gauge", "When the certificate in use ends, since 1970",
+                    expires);
     text += one("process_resident_memory_bytes", "gauge", "Memory in use", resident_bytes());
     return text;
 }

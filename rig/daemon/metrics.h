@@ -2,6 +2,7 @@
 
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <string>
 
@@ -19,6 +20,10 @@ public:
     void listener_joined() { ++listeners_; }
     void listener_left() { --listeners_; }
     void refused() { ++refused_; }
+    /// Of the TLS certificate in use.
+    void certificate_expires(std::chrono::system_clock::time_point when) {
+        certificate_expires_ = std::chrono::duration_cast<std::chrono::seconds>(when.time_since_epoch()).count();
+    }
 
     std::string text(Service& service) const;
 
@@ -27,6 +32,7 @@ private:
     std::atomic<std::int64_t> connections_{0};
     std::atomic<std::int64_t> listeners_{0};
     std::atomic<std::uint64_t> refused_{0};
+    std::atomic<std::int64_t> certificate_expires_{0};  ///< seconds since 1970; 0: there is none
 };
 
 }  // namespace darkbox

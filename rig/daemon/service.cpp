@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "acquisition/frame/error.h"
 #include "acquisition/session/bag.h"
 #include "rig/daemon/attempt.h"
@@ -89,7 +91,7 @@ std::optional<std::string> Service::stop() {
 
 ServiceStatus Service::status() const {
     const std::scoped_lock lock(mutex_);
-    ServiceStatus status{.state = state_, .problem = problem_, .last_event = log_.last()};
+    ServiceStatus status{.state = state_, .problem = problem_, .last_event = log_.last(), .lamps = lamps_};
     if (running_ != 0) status.running = book_.find(running_);
     status.queued = book_.unfinished(Lane::rig) - (running_ != 0 ? 1 : 0);
     status.processing = book_.unfinished(Lane::processing);
@@ -208,6 +210,7 @@ void Service::request_stop() noexcept {
 
 void Service::run(const std::stop_token& stop) {
     if (open_rig(stop)) {
+        look_at_lamps();
         while (const auto task = next_task(stop)) std::visit([this](const auto& t) { perform(t); }, *task);
         not_dark_ = darken_lamps();
         rig_.reset();
@@ -233,7 +236,12 @@ std::optional<Service::Task> Service::next_task(const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
     const auto may_take = [this] { return state_ == ServiceState::idle && !stopping_ && book_.has_queued(Lane::rig); };
     while (true) {
-        wake_.wait(lock, stop, [&] { return !tasks_.empty() || may_take(); });
+        while (!wake_.wait_for(lock, stop, options_.look_every, [&] { return !tasks_.empty() || may_take(); }) &&
+               !stop.stop_requested()) {
+            lock.unlock();
+            look_at_lamps();
+            lock.lock();
+        }
         // A capture that was accepted still ends as a job does, cancelled at once, so that its listeners hear of it.
         if (!tasks_.empty()) {
             Task task = std::move(tasks_.front());
@@ -304,6 +312,7 @@ void Service::perform(const Job& begun) {
     job.state = !failure ? JobState::done : failure->cancelled ? JobState::cancelled : JobState::failed;
     if (failure) job.failure = *failure;
     if (failure) job.failure.hint = hint_for(*failure, options_.sessions / job.session);
+    look_at_lamps();
     finish(std::move(job), not_dark);
 }
 
@@ -318,6 +327,18 @@ std::optional<Failure> Service::darken_lamps() {
     auto failure = attempt([this] { rig_->dark(); });
     log_.publish("lamps", {{"dark", !failure}, {"detail", failure ? failure->what : "all lamps are dark"}});
     return failure;
+}
+
+/// What is new about them is told once.
+void Service::look_at_lamps() {
+    LampHealth seen;
+    const auto failure = attempt([&] { seen = rig_->health(); });
+    if (failure) seen = {.reachable = false, .problems = {failure->what}};
+    const std::scoped_lock lock(mutex_);
+    for (const std::string& problem : seen.problems)
+        if (std::ranges::find(lamps_.problems, problem) == lamps_.problems.end())
+            log_.publish("problem", {{"detail", problem}, {"hint", "darkbox rig status tells when it is over"}});
+    lamps_ = std::move(seen);
 }
 
 /// The job's last event comes after the state's, so that whoever hears it may ask for the next capture.

@@ -50,7 +50,8 @@ public:
 struct ServiceOptions {
     std::filesystem::path sessions = "sessions";  ///< the folder that holds the sessions
     std::chrono::milliseconds reopen_every{2000};
-    std::size_t jobs_kept = 1000;  ///< finished jobs that can still be asked for
+    std::chrono::milliseconds look_every{10'000};  ///< at the lamps' health, while nothing is captured
+    std::size_t jobs_kept = 1000;                  ///< finished jobs that can still be asked for
     /// Bytes that a capture of these orders will write, at most; empty: not known, and nothing is refused for it.
     std::function<std::uint64_t(const CaptureOrder&)> bytes_needed = {};
     std::uint64_t bytes_kept_free = 256ULL << 20;  ///< on the sessions' disk, beyond what a capture needs
@@ -66,6 +67,7 @@ struct ServiceStatus {
     std::size_t queued = 0;      ///< captures that wait
     std::size_t processing = 0;  ///< processing jobs, running or waiting
     std::uint64_t last_event = 0;
+    LampHealth lamps = {};  ///< as last seen
 };
 
 /// What is asked cannot end well, so it does not begin: the disk is too full for it.
@@ -129,6 +131,7 @@ private:
     CaptureListener listener_for(const Job& job);
     void perform(Darken);
     std::optional<Failure> darken_lamps();
+    void look_at_lamps();
     void finish(Job job, const std::optional<Failure>& not_dark);
     void enter(ServiceState state, const std::string& problem);
 
@@ -146,6 +149,7 @@ private:
     std::deque<Task> tasks_;                      // guarded by mutex_
     std::uint64_t running_ = 0;                   // guarded by mutex_; 0 = none
     bool stopping_ = false;                       // guarded by mutex_
+    LampHealth lamps_;                            // guarded by mutex_
 
     std::atomic<std::uint64_t> frames_captured_{0};
     std::atomic<std::uint64_t> exposures_repeated_{0};

@@ -91,7 +91,13 @@ SocketFile::SocketFile(asio::io_context& io, fs::path path, std::optional<gid_t>
     inode_ = ours.st_ino;
 }
 
+SocketFile::SocketFile(asio::io_context& io, int listening) : acceptor_(io) {
+    acceptor_.assign(UnixProtocol(), listening);
+    path_ = acceptor_.local_endpoint().path();
+}
+
 SocketFile::~SocketFile() {
+    if (inode_ == 0) return;
     struct stat there{};
     if (::lstat(path_.c_str(), &there) == 0 && there.st_dev == device_ && there.st_ino == inode_)
         ::unlink(path_.c_str());

@@ -17,11 +17,14 @@ public:
     /// Replaces what a dead daemon left behind. Throws InputError when a live one answers there, or when something
     /// else than a socket is in the way; DeviceError when the system refuses.
     SocketFile(asio::io_context& io, std::filesystem::path path, std::optional<gid_t> group = std::nullopt);
+    /// One that systemd listens on: it is taken as it is, and its file stays.
+    SocketFile(asio::io_context& io, int listening);
     SocketFile(const SocketFile&) = delete;
     SocketFile& operator=(const SocketFile&) = delete;
     ~SocketFile();
 
     UnixProtocol::acceptor& acceptor() { return acceptor_; }
+    const std::filesystem::path& path() const { return path_; }
 
 private:
     std::filesystem::path path_;

@@ -1,6 +1,8 @@
-#include <boost/beast/websocket/stream.hpp>
-
 #include "rig/daemon/connection.h"
+
+// After asio.h, which makes Boost 1.74 compile.
+#include <boost/beast/websocket/ssl.hpp>
+#include <boost/beast/websocket/stream.hpp>
 
 namespace darkbox {
 namespace {
@@ -46,7 +48,7 @@ Task<> tell(Shared& shared, Socket& socket, std::uint64_t number) {
 
 template <typename Stream>
 Task<> run(Shared& shared, Stream& stream, const Request& request, std::uint64_t after) {
-    stream.expires_never();  // the WebSocket has deadlines of its own
+    beast::get_lowest_layer(stream).expires_never();  // the WebSocket has deadlines of its own
     websocket::stream<Stream&> socket(stream);
     websocket::stream_base::timeout limits{};
     limits.handshake_timeout = shared.options.deadline;
@@ -86,6 +88,9 @@ Task<> serve_websocket(Shared& shared, UnixStream& stream, const Request& reques
     co_await run(shared, stream, request, after);
 }
 Task<> serve_websocket(Shared& shared, TcpStream& stream, const Request& request, std::uint64_t after) {
+    co_await run(shared, stream, request, after);
+}
+Task<> serve_websocket(Shared& shared, TlsStream& stream, const Request& request, std::uint64_t after) {
     co_await run(shared, stream, request, after);
 }
 

@@ -10,6 +10,7 @@
 #include "acquisition/frame/error.h"
 #include "rig/description/capture_section.h"
 #include "rig/description/dose_section.h"
+#include "rig/description/health_section.h"
 #include "rig/description/toml_section.h"
 
 namespace darkbox {
@@ -362,12 +363,19 @@ SimDescription read_sim(TomlSection& section) {
 }
 
 void read_api(TomlSection& section, RigDescription& rig) {
-    section.allow({"sessions", "socket", "group", "listen", "token_file"});
+    section.allow({"sessions", "socket", "group", "listen", "token_file", "certificate", "key"});
     rig.sessions_folder = section.text("sessions").value_or("");
     rig.socket = section.text("socket").value_or("");
     rig.socket_group = section.text("group").value_or("");
     rig.listen = section.text("listen").value_or("");
     rig.token_file = section.text("token_file").value_or("");
+    rig.certificate = section.text("certificate").value_or("");
+    rig.key = section.text("key").value_or("");
+    if (rig.certificate.empty() != rig.key.empty()) {
+        const char* given = rig.key.empty() ? "certificate" : "key";
+        const char* other = rig.key.empty() ? "key" : "certificate";
+        section.fail(given, fmt::format("has {} without {}", given, other), "TLS needs both: name the two PEM files");
+    }
 }
 
 RetentionRules read_retention(TomlSection& section) {
@@ -391,7 +399,8 @@ void settle_simulated_camera(RigDescription& rig) {
 }
 
 RigDescription read_rig(TomlSection& root) {
-    root.allow({"rig", "camera", "lamps", "ball", "door", "dose", "capture", "processing", "api", "retention", "sim"},
+    root.allow({"rig", "camera", "lamps", "ball", "door", "dose", "health", "capture", "processing", "api", "retention",
+                "sim"},
                "section");
     RigDescription rig;
     if (auto section = root.section("rig", "[rig]")) {
@@ -415,6 +424,7 @@ RigDescription read_rig(TomlSection& root) {
     if (!lamps) root.fail("lamps", "has no [lamps]", "add [lamps] with a [[lamps.lamp]] for each lamp");
     read_lamps(*lamps, rig);
     if (auto section = root.section("door", "[door]")) rig.door = read_door(*section, rig);
+    if (auto section = root.section("health", "[health]")) rig.health = read_health(*section, rig.lamps_driver);
     if (auto section = root.section("dose", "[dose]")) rig.dose = read_dose(*section, rig.lamps);
     const bool sees_lamps = rig.camera.driver == "sim" && !rig.sim.lamps_seen.empty();
     if ((rig.camera.driver == "sim") != (rig.lamps_driver == "sim") && !sees_lamps)

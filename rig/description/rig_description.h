@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "acquisition/frame/units.h"
+#include "rig/description/health_description.h"
 #include "rig/description/retention_rules.h"
 
 namespace darkbox {
@@ -138,6 +139,7 @@ struct RigDescription {
     std::optional<double> ball_diameter_mm;
     DoseDescription dose;
     std::optional<DoorDescription> door;
+    HealthDescription health;
     CaptureDescription capture;
     SimDescription sim;
     std::filesystem::path sessions_folder;  ///< [api] sessions; empty = the caller's default
@@ -145,6 +147,8 @@ struct RigDescription {
     std::string socket_group;               ///< [api] group: whose members may use the socket; empty = only the owner
     std::string listen;                     ///< [api] listen: "127.0.0.1:7640"; empty = no TCP
     std::filesystem::path token_file;       ///< [api] token_file, for TCP; empty = beside the socket
+    std::filesystem::path certificate;      ///< [api] certificate, PEM; empty = TCP without TLS, on loopback only
+    std::filesystem::path key;              ///< [api] key, PEM; empty as the certificate is
     std::optional<RetentionRules> retention = {};  ///< none: sessions are never removed
     std::string toml;                              ///< the text it came from, byte for byte
 };

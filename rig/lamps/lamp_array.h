@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,7 +14,8 @@ class StrobedLamps;
 
 struct LampHealth {
     bool reachable = true;
-    std::vector<std::string> problems;  ///< sentences for people; empty when all is well
+    std::vector<std::string> problems = {};    ///< sentences for people; empty when all is well
+    std::optional<double> temperature_c = {};  ///< of the lamps' heat sink; none: there is no thermometer
 };
 
 /// The lamps of a rig; at most one is lit. Every implementation is dark before its constructor returns and after its

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "acquisition/device/device_error.h"
+#include "rig/lamps/thermistor.h"
 
 namespace darkbox {
 
@@ -139,7 +140,10 @@ bool UsbLamps::is_dark() {
 
 LampHealth UsbLamps::health() {
     try {
-        return {.reachable = true, .problems = faults_in_words(controller_.status().faults)};
+        const Status status = controller_.status();
+        return {.reachable = true,
+                .problems = faults_in_words(status.faults),
+                .temperature_c = celsius_of_thermistor(status.temperature)};
     } catch (const Error& error) {
         return {.reachable = false, .problems = {error.what()}};
     }

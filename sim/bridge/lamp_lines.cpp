@@ -25,11 +25,11 @@ LampLines::LampLines(const std::filesystem::path& chip, std::size_t lamps, const
     }
 }
 
-std::vector<bool> LampLines::burning() const {
-    std::vector<bool> burning;
+std::vector<double> LampLines::burning() const {
+    std::vector<double> burning;
     for (const UniqueFd& line : line_of_lamp_) {
         char level = '0';
-        burning.push_back(line && ::pread(line.get(), &level, 1, 0) == 1 && level == '1');
+        burning.push_back(line && ::pread(line.get(), &level, 1, 0) == 1 && level == '1' ? 1.0 : 0.0);
     }
     return burning;
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "acquisition/device/unique_fd.h"
+#include "sim/bridge/lamp_view.h"
 
 namespace darkbox::sim {
 
@@ -15,13 +16,13 @@ struct WiringFault {
 
 /// The lamps as wires see them: lamp i burns while line i of a gpio-sim chip is high, whoever drives it. Reads what the
 /// kernel says in sysfs. Thread-compatible.
-class LampLines {
+class LampLines final : public LampView {
 public:
     /// `chip`: the chip's folder in sysfs. Throws DeviceError.
     LampLines(const std::filesystem::path& chip, std::size_t lamps, const WiringFault& fault);
 
-    /// Whether each lamp burns now; all dark while the chip is unplugged.
-    std::vector<bool> burning() const;
+    /// All dark while the chip is unplugged.
+    std::vector<double> burning() const override;
 
 private:
     std::vector<UniqueFd> line_of_lamp_;  ///< empty: a cut wire

@@ -16,7 +16,7 @@ constexpr Seconds automatic_exposure{0.002};
 
 }  // namespace
 
-TwinCamera::TwinCamera(const TwinPictures& pictures, const LampLines& lamps, Clock& clock, const TwinOptions& options,
+TwinCamera::TwinCamera(const TwinPictures& pictures, const LampView& lamps, Clock& clock, const TwinOptions& options,
                        TwinOrders& orders)
     : pictures_(pictures), lamps_(lamps), clock_(clock), options_(options), orders_(orders) {}
 
@@ -33,13 +33,20 @@ void TwinCamera::stay_plugged_in() {
     UvcCamera camera(options_.mode, "TWIN0001");
     UsbIpPort port(camera, clock_, options_.port);
     while (!orders_.leave && !orders_.unplug.exchange(false) && !port.host_is_gone()) {
-        const TimePoint begin = clock_.now();
-        if (port.is_waiting(UvcCamera::stream_endpoint))
-            frame(camera, port);
-        else
-            port.serve_until_waiting(UvcCamera::stream_endpoint, begin + idle);
-        if (port.is_waiting(UvcCamera::stream_endpoint)) port.serve(begin + to_nanoseconds(options_.mode.period));
+        port.serve_until_waiting(UvcCamera::stream_endpoint, clock_.now() + idle);
+        if (!port.is_waiting(UvcCamera::stream_endpoint)) continue;
+        wait_for_its_turn(port);
+        if (port.is_waiting(UvcCamera::stream_endpoint)) frame(camera, port);
     }
+}
+
+/// Late, it waits for the next turn: a free-running camera leaves frames out, and keeps its rhythm.
+void TwinCamera::wait_for_its_turn(UsbIpPort& port) {
+    const Nanoseconds period = to_nanoseconds(options_.mode.period);
+    const TimePoint now = clock_.now();
+    if (next_ < now) next_ += (now - next_ + period - Nanoseconds(1)) / period * period;
+    port.serve(next_);
+    next_ += period;
 }
 
 /// The first payload of a frame leaves when its exposure ends, as a sensor's readout begins: it is then that the kernel
@@ -59,12 +66,14 @@ std::vector<double> TwinCamera::watch_lamps(Seconds exposure, UsbIpPort& port) c
     std::vector<double> shares(pictures_.lamps(), 0.0);
     const TimePoint end = clock_.now() + to_nanoseconds(exposure);
     double looks = 0;
+    if (options_.strobe != nullptr) options_.strobe->drive(true);
     do {
-        const std::vector<bool> burning = lamps_.burning();
-        for (std::size_t i = 0; i < shares.size(); ++i) shares[i] += burning[i] ? 1.0 : 0.0;
+        const std::vector<double> burning = lamps_.burning();
+        for (std::size_t i = 0; i < shares.size(); ++i) shares[i] += burning[i];
         ++looks;
         port.serve(std::min(end, clock_.now() + look_at_lamps_every));
     } while (clock_.now() < end);
+    if (options_.strobe != nullptr) options_.strobe->drive(false);
     for (double& share : shares) share /= looks;
     return shares;
 }

@@ -20,20 +20,16 @@ struct UsbRequest {
 
 using UsbBytes = std::vector<std::uint8_t>;
 
-/// What a device says of itself.
-struct UsbDescriptors {
-    UsbBytes device;
-    UsbBytes configuration;            ///< with all that belongs to it
-    std::vector<std::string> strings;  ///< string descriptor 1 and following, ASCII
-};
+/// As the kernel numbers them (enum usb_device_speed).
+enum class UsbSpeed { full = 2, high = 3 };
 
-/// A USB device's own part: what its port does not do for every device. Thread-compatible.
+/// A USB device behind its port. Thread-compatible.
 class UsbFunction {
 public:
     virtual ~UsbFunction() = default;
-    virtual const UsbDescriptors& descriptors() const = 0;
-    /// A request of a class or a vendor. `data` is what the host sent; the answer goes to the host where the request
-    /// asks for one. No value: the request is stalled.
+    virtual UsbSpeed speed() const = 0;
+    /// A request to endpoint 0, of whatever kind. `data` is what the host sent; the answer goes to the host where the
+    /// request asks for one. No value: the request is stalled.
     virtual std::optional<UsbBytes> control(const UsbRequest& request, std::span<const std::uint8_t> data) = 0;
 };
 

@@ -18,11 +18,7 @@ namespace {
 constexpr std::uint32_t cmd_submit = 1, cmd_unlink = 2, ret_submit = 3, ret_unlink = 4;
 constexpr std::uint32_t largest_transfer = 1U << 20;
 constexpr const char* attach_file = "/sys/devices/platform/vhci_hcd.0/attach";
-constexpr int high_speed = 3;
-
-constexpr std::uint8_t get_status = 0, set_feature = 3, clear_feature = 1, get_descriptor = 6, get_configuration = 8,
-                       set_configuration = 9, set_interface = 11;
-constexpr std::uint8_t type_mask = 0x60, to_host = 0x80;
+constexpr std::uint8_t to_host = 0x80;
 
 UsbRequest parse(const std::array<std::uint8_t, 8>& setup) {
     const auto word = [&](std::size_t i) { return static_cast<std::uint16_t>(setup.at(i) | setup.at(i + 1) << 8); };
@@ -49,7 +45,8 @@ UsbIpPort::UsbIpPort(UsbFunction& function, Clock& clock, int port) : function_(
     socket_.reset(ends[0]);
     const UniqueFd kernels(ends[1]);
     const UniqueFd attach(::open(attach_file, O_WRONLY | O_CLOEXEC));
-    const std::string order = fmt::format("{} {} {} {}", port, kernels.get(), 1 << 16 | (port + 2), high_speed);
+    const std::string order =
+        fmt::format("{} {} {} {}", port, kernels.get(), 1 << 16 | (port + 2), static_cast<int>(function.speed()));
     if (!attach) throw_errno("open", attach_file, errno, "load the module vhci-hcd, and run this as root");
     if (::write(attach.get(), order.data(), order.size()) != static_cast<ssize_t>(order.size()))
         throw_errno("write", attach_file, errno, "another device may be in that port");
@@ -70,16 +67,22 @@ void UsbIpPort::serve_until_waiting(std::uint8_t endpoint, TimePoint until) {
 }
 
 bool UsbIpPort::is_waiting(std::uint8_t endpoint) const {
-    const auto found = waiting_.find(endpoint);
-    return found != waiting_.end() && !found->second.empty();
+    return std::any_of(waiting_.begin(), waiting_.end(), [&](const auto& t) { return t.endpoint == endpoint; });
+}
+
+void UsbIpPort::finish(std::uint32_t id, int error, std::span<const std::uint8_t> data) {
+    const auto found = std::find_if(waiting_.begin(), waiting_.end(), [&](const auto& t) { return t.id == id; });
+    if (found == waiting_.end()) return;
+    const auto went = data.first(std::min<std::size_t>(data.size(), found->length));
+    const bool in = (found->endpoint & to_host) != 0;
+    waiting_.erase(found);
+    reply(id, error, static_cast<std::uint32_t>(went.size()), in ? went : std::span<const std::uint8_t>());
 }
 
 void UsbIpPort::complete(std::uint8_t endpoint, std::span<const std::uint8_t> data) {
-    std::deque<Transfer>& transfers = waiting_.at(endpoint);
-    const Transfer transfer = transfers.front();
-    transfers.pop_front();
-    const auto sent = data.first(std::min<std::size_t>(data.size(), transfer.length));
-    reply(transfer.sequence, 0, static_cast<std::uint32_t>(sent.size()), sent);
+    const auto oldest =
+        std::find_if(waiting_.begin(), waiting_.end(), [&](const auto& t) { return t.endpoint == endpoint; });
+    finish(oldest->id, 0, data);
 }
 
 void UsbIpPort::serve_one() {
@@ -106,20 +109,17 @@ void UsbIpPort::submit(const Header& header) {
             return;
         }
     }
-    if (header.endpoint == 0)
-        control(header, data);
-    else if (header.to_host != 0)
-        waiting_[static_cast<std::uint8_t>(header.endpoint)].push_back({header.sequence, length});
-    else
-        reply(header.sequence, -EPIPE, 0, {});
+    if (header.endpoint == 0) return control(header, data);
+    const auto direction = header.to_host != 0 ? to_host : std::uint8_t{0};
+    const auto endpoint = static_cast<std::uint8_t>(header.endpoint | direction);
+    waiting_.push_back({header.sequence, endpoint, length, std::move(data)});
 }
 
 /// The host takes a transfer back. One that was answered already is answered with 0.
 void UsbIpPort::unlink(const Header& header) {
     const std::uint32_t victim = header.word[0];
-    int status = 0;
-    for (auto& [endpoint, transfers] : waiting_)
-        if (std::erase_if(transfers, [&](const Transfer& t) { return t.sequence == victim; }) > 0) status = -ECONNRESET;
+    const bool waited = std::erase_if(waiting_, [&](const UsbTransfer& t) { return t.id == victim; }) > 0;
+    const int status = waited ? -ECONNRESET : 0;
     Header answer;
     answer.command = htonl(ret_unlink);
     answer.sequence = htonl(header.sequence);
@@ -129,47 +129,12 @@ void UsbIpPort::unlink(const Header& header) {
 
 void UsbIpPort::control(const Header& header, std::span<const std::uint8_t> data) {
     const UsbRequest request = parse(header.setup);
-    const auto answer = (request.type & type_mask) == 0 ? standard_request(request) : function_.control(request, data);
+    const auto answer = function_.control(request, data);
     if (!answer) return reply(header.sequence, -EPIPE, 0, {});
     if ((request.type & to_host) == 0) return reply(header.sequence, 0, static_cast<std::uint32_t>(data.size()), {});
     const std::size_t most = std::min<std::size_t>(request.length, header.word[1]);
     const auto sent = std::span(*answer).first(std::min(answer->size(), most));
     reply(header.sequence, 0, static_cast<std::uint32_t>(sent.size()), sent);
-}
-
-std::optional<UsbBytes> UsbIpPort::standard_request(const UsbRequest& request) {
-    switch (request.request) {
-        case get_descriptor:
-            return descriptor(request);
-        case get_status:
-            return UsbBytes{0, 0};
-        case get_configuration:
-            return UsbBytes{configuration_};
-        case set_configuration:
-            configuration_ = static_cast<std::uint8_t>(request.value);
-            return UsbBytes{};
-        case set_interface:
-        case set_feature:
-        case clear_feature:
-            return UsbBytes{};
-        default:
-            return std::nullopt;
-    }
-}
-
-/// USB 2.0, 9.4.3 and 9.6.
-std::optional<UsbBytes> UsbIpPort::descriptor(const UsbRequest& request) const {
-    constexpr std::uint8_t device = 1, configuration = 2, string = 3;
-    const UsbDescriptors& own = function_.descriptors();
-    const unsigned type = request.value >> 8U, index = request.value & 255U;
-    if (type == device) return own.device;
-    if (type == configuration && index == 0) return own.configuration;
-    if (type != string || index > own.strings.size()) return std::nullopt;
-    if (index == 0) return UsbBytes{4, string, 0x09, 0x04};  // English
-    const std::string& text = own.strings[index - 1];
-    UsbBytes bytes{static_cast<std::uint8_t>(2 + 2 * text.size()), string};
-    for (const char c : text) bytes.insert(bytes.end(), {static_cast<std::uint8_t>(c), 0});
-    return bytes;
 }
 
 void UsbIpPort::reply(std::uint32_t sequence, int status, std::uint32_t length, std::span<const std::uint8_t> data) {

@@ -88,23 +88,23 @@ UsbBytes streaming_descriptors(const UvcCamera::Mode& mode) {
     constexpr std::uint32_t header_size = 14;
     return join({sized(join({{cs_interface, 1, 1},
                              number(static_cast<std::uint32_t>(header_size + formats.size()), 2),
-                             {0x80 | UvcCamera::stream_endpoint, 0, output_terminal, 0, 0, 0, 1, 0}})),
+                             {UvcCamera::stream_endpoint, 0, output_terminal, 0, 0, 0, 1, 0}})),
                  formats});
 }
 
 UsbDescriptors describe(const UvcCamera::Mode& mode, const std::string& serial) {
     UsbDescriptors result;
     result.strings = {"darkbox", "Digital twin", serial};
-    // Vendor 0x1209: pid.codes; product 1 is for tests.
+    // Vendor 0x1209: pid.codes; products 1 to 16 are for tests, and the lamp controller has 1.
     result.device = sized(join(
-        {{1}, number(0x0200, 2), {0xef, 2, 1, 64}, number(0x1209, 2), number(1, 2), number(0x0100, 2), {1, 2, 3, 1}}));
+        {{1}, number(0x0200, 2), {0xef, 2, 1, 64}, number(0x1209, 2), number(2, 2), number(0x0100, 2), {1, 2, 3, 1}}));
     const UsbBytes content = join({
         sized({11, control_interface, 2, video_class, interface_collection, 0, 0}),
         interface(control_interface, 0, video_control),
         control_descriptors(),
         interface(streaming_interface, 1, video_streaming),
         streaming_descriptors(mode),
-        sized(join({{5, 0x80 | UvcCamera::stream_endpoint, 2}, number(512, 2), {0}})),
+        sized(join({{5, UvcCamera::stream_endpoint, 2}, number(512, 2), {0}})),
     });
     constexpr std::uint32_t header_size = 9;
     result.configuration = join(
@@ -122,8 +122,8 @@ std::int32_t value_of(std::span<const std::uint8_t> data) {
 }  // namespace
 
 UvcCamera::UvcCamera(const Mode& mode, const std::string& serial)
-    : mode_(mode),
-      descriptors_(describe(mode, serial)),
+    : DescribedFunction(describe(mode, serial)),
+      mode_(mode),
       controls_{Control{camera_terminal, ae_mode, 1, 1, 8, manual_mode | aperture_priority, aperture_priority,
                         aperture_priority},
                 Control{camera_terminal, exposure_absolute, 4, 1, 10'000, 1, 156, 156},
@@ -133,7 +133,7 @@ bool UvcCamera::is_automatic() const { return controls_[0].value != manual_mode;
 Seconds UvcCamera::exposure() const { return Seconds(controls_[1].value * exposure_unit_s); }
 double UvcCamera::gain() const { return static_cast<double>(controls_[2].value) / lowest_gain; }
 
-std::optional<UsbBytes> UvcCamera::control(const UsbRequest& request, std::span<const std::uint8_t> data) {
+std::optional<UsbBytes> UvcCamera::own_request(const UsbRequest& request, std::span<const std::uint8_t> data) {
     constexpr std::uint8_t of_a_class_to_an_interface = 0x21;
     if ((request.type & 0x7fU) != of_a_class_to_an_interface) return std::nullopt;
     return (request.index & 255U) == streaming_interface ? streaming_request(request) : control_request(request, data);

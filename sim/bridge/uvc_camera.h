@@ -4,16 +4,16 @@
 #include <span>
 
 #include "acquisition/frame/units.h"
-#include "sim/bridge/usb_function.h"
+#include "sim/bridge/described_function.h"
 
 namespace darkbox::sim {
 
 /// The USB side of a camera of the USB video class 1.1 ("UVC"): one picture format, Y16 in one size and rate, streamed
 /// by bulk transfers, with exposure mode, exposure time and gain as controls. It powers on in automatic exposure, as
 /// cameras do. Thread-compatible.
-class UvcCamera final : public UsbFunction {
+class UvcCamera final : public DescribedFunction {
 public:
-    static constexpr std::uint8_t stream_endpoint = 2;
+    static constexpr std::uint8_t stream_endpoint = 0x82;  ///< to the host
     static constexpr std::size_t largest_payload = 16384;  ///< bytes of one transfer, header included
     static constexpr int lowest_gain = 10;                 ///< control value of gain 1
 
@@ -23,9 +23,6 @@ public:
         Seconds period{0.25};
     };
     UvcCamera(const Mode& mode, const std::string& serial);
-
-    const UsbDescriptors& descriptors() const override { return descriptors_; }
-    std::optional<UsbBytes> control(const UsbRequest& request, std::span<const std::uint8_t> data) override;
 
     bool is_automatic() const;
     Seconds exposure() const;
@@ -38,6 +35,9 @@ public:
         bool error = false;
     };
     static std::array<std::uint8_t, 2> bytes(const PayloadHeader& header);
+
+protected:
+    std::optional<UsbBytes> own_request(const UsbRequest& request, std::span<const std::uint8_t> data) override;
 
 private:
     struct Control {
@@ -53,7 +53,6 @@ private:
     UsbBytes agreed_stream() const;
 
     Mode mode_;
-    UsbDescriptors descriptors_;
     std::array<Control, 3> controls_;
 };
 

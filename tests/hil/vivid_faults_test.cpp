@@ -31,7 +31,9 @@ public:
     void light(LampId lamp, double) override {
         show(Vivid::noise, lamp.value == 0 ? 0 : 1);
         lit = lamp;
-        if (lamp.value == 1) std::exchange(when_lamp_2_is_lit, [] {})();
+        if (lamp.value != 1) return;
+        ++times_lamp_2_was_lit;
+        std::exchange(when_lamp_2_is_lit, [] {})();
     }
     void dark() override {
         show(Vivid::black, 0);
@@ -41,6 +43,7 @@ public:
 
     std::function<void()> when_lamp_2_is_lit = [] {};  ///< done once
     std::optional<LampId> lit;
+    int times_lamp_2_was_lit = 0;
 
 private:
     void show(int pattern, int square) const {
@@ -49,6 +52,24 @@ private:
     }
 
     const Vivid& vivid_;
+};
+
+/// A camera that lets somebody act before each wait for a frame.
+class WatchedCamera final : public Camera {
+public:
+    WatchedCamera(Camera& camera, std::function<void()> before) : camera_(camera), before_(std::move(before)) {}
+
+    CameraInfo configure(const CameraConfig& config) override { return camera_.configure(config); }
+    void start() override { camera_.start(); }
+    Frame next_frame(TimePoint deadline) override {
+        before_();
+        return camera_.next_frame(deadline);
+    }
+    void stop() override { camera_.stop(); }
+
+private:
+    Camera& camera_;
+    std::function<void()> before_;
 };
 
 /// Whole captures by the V4L2 driver, with vivid's faults injected while lamp 2 is lit.
@@ -71,7 +92,8 @@ protected:
     }
 
     CapturedSession capture() {
-        V4l2Camera camera(device, clock, options());
+        V4l2Camera kernels(device, clock, options());
+        WatchedCamera camera(kernels, before_each_wait);
         return capture_session({.folder = folder.path() / "session", .object = "bars", .lamps = {"lamp-01", "lamp-02"}},
                                rig, *lamps, camera, clock);
     }
@@ -105,6 +127,7 @@ protected:
         EXPECT_EQ(capture().session.frames().size(), 4U);
     }
 
+    std::function<void()> before_each_wait = [] {};
     std::optional<Vivid> vivid;
     std::optional<PatternLamps> lamps;
     RigDescription rig;
@@ -120,7 +143,14 @@ TEST_F(VividFaults, NoneLeavesACompleteSession) {
     for (const SessionEvent& event : captured.session.events()) std::cout << "  told: " << event.what << '\n';
 }
 
-TEST_F(VividFaults, FlaggedBufferIsTakenAgain) { expect_repaired(Vivid::inject_buffer_error, "flagged as damaged"); }
+/// Every buffer that is filled in the lamp's first light: nobody looks at one that was exposed too early.
+TEST_F(VividFaults, FlaggedBufferIsTakenAgain) {
+    before_each_wait = [this] {
+        if (lamps->lit && lamps->lit->value == 1 && lamps->times_lamp_2_was_lit == 1)
+            vivid->set(Vivid::inject_buffer_error, 1);
+    };
+    expect_repaired(Vivid::inject_buffer_error, "flagged as damaged");
+}
 
 TEST_F(VividFaults, DroppedBuffersAreCounted) {
     expect_repaired([this] { vivid->set(Vivid::percentage_of_dropped_buffers, 90); }, "the camera lost");

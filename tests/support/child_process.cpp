@@ -22,7 +22,8 @@ std::string text_of(const std::filesystem::path& file) {
 
 }  // namespace
 
-ChildProcess::ChildProcess(const std::vector<std::string>& arguments, std::filesystem::path log)
+ChildProcess::ChildProcess(const std::vector<std::string>& arguments, std::filesystem::path log,
+                           const std::vector<int>& handed)
     : log_(std::move(log)) {
     std::vector<char*> argv;
     for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
@@ -32,6 +33,8 @@ ChildProcess::ChildProcess(const std::vector<std::string>& arguments, std::files
     const int flags = O_WRONLY | O_CREAT | O_TRUNC;
     ::posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, (log_.string() + ".out").c_str(), flags, owner_writes);
     ::posix_spawn_file_actions_addopen(&files, STDERR_FILENO, (log_.string() + ".err").c_str(), flags, owner_writes);
+    for (std::size_t i = 0; i < handed.size(); ++i)
+        ::posix_spawn_file_actions_adddup2(&files, handed[i], STDERR_FILENO + 1 + static_cast<int>(i));
     const int error = ::posix_spawn(&pid_, argv.front(), &files, nullptr, argv.data(), environ);
     ::posix_spawn_file_actions_destroy(&files);
     if (error != 0) throw std::runtime_error("cannot run " + arguments.front());

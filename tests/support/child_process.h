@@ -11,8 +11,10 @@ namespace darkbox::test {
 /// A program run by a test, its stdout and stderr in files. The destructor kills it.
 class ChildProcess {
 public:
-    /// `arguments` start with the program's path. Its output goes to LOG.out and LOG.err.
-    ChildProcess(const std::vector<std::string>& arguments, std::filesystem::path log);
+    /// `arguments` start with the program's path. Its output goes to LOG.out and LOG.err. The child finds `handed` as
+    /// its descriptors from 3 on; their own numbers must lie beyond those.
+    ChildProcess(const std::vector<std::string>& arguments, std::filesystem::path log,
+                 const std::vector<int>& handed = {});
     ChildProcess(const ChildProcess&) = delete;
     ChildProcess& operator=(const ChildProcess&) = delete;
     ~ChildProcess();

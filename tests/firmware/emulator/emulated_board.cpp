@@ -49,6 +49,7 @@ struct EmulatedBoard::Simulator {
     std::vector<std::uint8_t> shifted{anything, anything + 8};
     std::array<std::uint8_t, 8> latched{0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF};
     std::uint8_t last_port_b = 0;
+    std::array<std::uint8_t, 6> pins_seen{};
     std::uint8_t sending = 0;
     unsigned first_free = 0;
     std::optional<std::uint32_t> hung_at;
@@ -56,6 +57,11 @@ struct EmulatedBoard::Simulator {
     std::uint32_t last_pc = 0;
 
     std::uint8_t reg(unsigned address) const { return avr->data[address]; }
+
+    /// What the pins are made of.
+    std::array<std::uint8_t, 6> pin_registers() const {
+        return {reg(ddr_b), reg(port_b), reg(ddr_c), reg(port_c), reg(tccr3a), reg(ocr3a)};
+    }
 
     void take_over_spi() {
         auto& io = avr->io[AVR_DATA_TO_IO(spdr)];
@@ -148,6 +154,9 @@ void EmulatedBoard::step() {
 /// simavr raises no event for every change, and none at a reset: so the pins are looked at after each instruction.
 void EmulatedBoard::look() {
     Simulator& c = *chip_;
+    const auto pins = c.pin_registers();
+    if (pins == c.pins_seen) return;
+    c.pins_seen = pins;
     const std::uint8_t b = c.reg(port_b);
     if ((b & latch) != 0 && (c.last_port_b & latch) == 0)
         std::reverse_copy(c.shifted.begin(), c.shifted.end(), c.latched.begin());
@@ -218,6 +227,7 @@ void EmulatedBoard::brown_out() {
     ++resets_;
     chip_->last_pc = 0;
     std::copy_n(anything, 8, chip_->latched.begin());
+    chip_->pins_seen.fill(0xFF);  // other registers behind the same pins
     look();
 }
 

@@ -11,6 +11,8 @@ using Handshake = EmulatedBoard::Handshake;
 using std::chrono::steady_clock;
 
 constexpr double slice_us = 100;
+/// Of a chip that is behind: its bus is looked after less often.
+constexpr std::uint64_t longer_slice_us = 500;
 constexpr auto idle_nap = std::chrono::microseconds(500);
 constexpr auto hopelessly_late = std::chrono::milliseconds(100);
 
@@ -151,8 +153,8 @@ bool PacedBoard::serve() {
     std::list<RequestPtr> requests;
     {
         const std::lock_guard lock(mutex_);
+        if (waiting_.empty() || !plugged_ || !present_) return false;
         requests = waiting_;
-        if (!plugged_ || !present_) requests.clear();
     }
     std::vector<std::uint8_t> busy;
     bool progress = false;
@@ -199,7 +201,8 @@ void PacedBoard::catch_up() {
     const auto due = cycle_start_ + static_cast<std::uint64_t>(std::chrono::nanoseconds(wall).count()) * 16 / 1000;
     if (board_.cycle() < due) {
         follow_strobe();
-        board_.run_us(slice_us);
+        const bool behind = board_.cycle() + longer_slice_us * EmulatedBoard::cycles_per_us < due;
+        board_.run_us(behind ? static_cast<double>(longer_slice_us) : slice_us);
     }
     if (board_.cycle() + std::chrono::nanoseconds(hopelessly_late).count() * 16 / 1000 < due) {
         wall_start_ = steady_clock::now();

@@ -88,6 +88,17 @@ TEST(CaptureRun, RejectsNoGoodFrameInManySessions) {
     }
 }
 
+/// What is no rhythm is not predicted by: waiting for it cost every second lamp a try.
+TEST(CaptureRun, ACameraSlowerThanItSaysTakesNoMoreTries) {
+    Bench bench;
+    bench.camera.real_period = milliseconds(75);
+    bench.rig.capture.frame_deadline = Seconds(0.3);
+    const Session session = bench.capture();
+    test::expect_every_frame_right(session, bench.rig);
+    EXPECT_TRUE(session.events().empty()) << test::events_of(session);
+    EXPECT_EQ(bench.camera.starts, 1);
+}
+
 class BadPlan : public testing::Test {
 protected:
     Bench bench;

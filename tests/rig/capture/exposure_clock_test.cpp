@@ -76,6 +76,30 @@ TEST(ExposureClock, FollowsANewRhythmThatStays) {
     EXPECT_NEAR(to_seconds(clock.predicted(50).begin - begin_of(50)), 0.011, 1e-5);
 }
 
+/// Such as delivers each frame when it can, or far fewer a second than it says.
+TEST(ExposureClock, ACameraThatKeepsNoRhythmHasNone) {
+    std::mt19937 random(2);
+    std::uniform_int_distribution<int> pause_ms(60, 140);
+    for (const bool steady : {false, true}) {
+        ExposureClock clock(camera(), std::nullopt);
+        TimePoint at = start;
+        for (std::uint64_t n = 0; n < 60; ++n) {
+            at += milliseconds(steady ? 66 : pause_ms(random));
+            Frame late = frame(n);
+            late.timestamp = at;
+            late.exposure = {at, at + milliseconds(20)};
+            EXPECT_TRUE(clock.follow(late)) << "a stamp is believed as long as nothing speaks against it";
+            EXPECT_FALSE(clock.locked()) << n;
+        }
+        for (std::uint64_t n = 60; n < 100; ++n) {
+            Frame again = frame(n);
+            again.timestamp = at + real_period * static_cast<std::int64_t>(n - 59);
+            clock.follow(again);
+        }
+        EXPECT_TRUE(clock.locked()) << "it keeps its rate again";
+    }
+}
+
 TEST(ExposureClock, AMeasuredTimingTakesTheDriversPlace) {
     ExposureClock clock(camera(),
                         MeasuredTiming{milliseconds(-20), milliseconds(3), Nanoseconds(0), microseconds(100)});

@@ -121,7 +121,7 @@ void FakeCamera::stop() {
 }
 
 TimePoint FakeCamera::end_of(std::uint64_t sequence) const {
-    return started_ + period * static_cast<std::int64_t>(sequence + 1);
+    return started_ + real_period * static_cast<std::int64_t>(sequence + 1);
 }
 
 void FakeCamera::fill_queue() {

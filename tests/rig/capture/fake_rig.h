@@ -75,8 +75,9 @@ public:
     std::function<void(Frame& frame, int number)> tamper;
     /// How much earlier than it says a frame was exposed.
     std::function<Nanoseconds(std::uint64_t sequence)> lie = [](std::uint64_t) { return Nanoseconds{0}; };
-    std::set<std::uint64_t> lost;  ///< sequence numbers that never arrive
-    bool hanging = false;          ///< delivers nothing; stop() ends it unless it hangs for ever
+    std::set<std::uint64_t> lost;                             ///< sequence numbers that never arrive
+    Nanoseconds real_period = std::chrono::milliseconds(25);  ///< whatever it says; before it is started
+    bool hanging = false;  ///< delivers nothing; stop() ends it unless it hangs for ever
     bool hangs_for_ever = false;
     std::string id = "0001";
     double black_level = 64;

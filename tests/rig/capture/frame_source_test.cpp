@@ -99,6 +99,16 @@ TEST_F(FrameSourceTest, GivesUpAtTheDeadlineAndRecoversOnce) {
     EXPECT_NO_THROW(source.first_after(clock.now(), clock.now() + seconds(1)));
 }
 
+TEST_F(FrameSourceTest, ASlowCameraIsNotSaidToHang) {
+    FrameSource source(camera, clock, {}, work);
+    try {
+        source.first_after(clock.now() + seconds(2), clock.now() + milliseconds(210));
+        ADD_FAILURE() << "no DeadlineError";
+    } catch (const DeadlineError& error) {
+        EXPECT_THAT(error.what(), testing::HasSubstr("8 frames came, none of which began after the lamp was steady"));
+    }
+}
+
 TEST_F(FrameSourceTest, IsCancelledWhileTheCameraHangs) {
     std::stop_source stop;
     work.stop = stop.get_token();

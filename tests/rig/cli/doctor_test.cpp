@@ -144,6 +144,81 @@ TEST(Doctor, ComparesTheCameraWithItsBus) {
     EXPECT_TRUE(diagnose_camera_bus(rig, machine).empty());
 }
 
+/// A tree as sysfs': a camera and a lamp controller on USB.
+class DoctorOnUsb : public testing::Test {
+protected:
+    DoctorOnUsb() {
+        write("dev/video0", "");
+        device("1-2", {{"idVendor", "046d"}, {"idProduct", "0825"}, {"speed", "480"}, {"product", "Webcam"}});
+        device("1-3", {{"idVendor", "1209"}, {"idProduct", "0001"}, {"product", "darkbox lamp controller"}});
+        fs::create_directories(sys() / "devices/usb1/1-2/1-2:1.0/video4linux/video0");
+        fs::create_directories(sys() / "class/video4linux");
+        fs::create_directory_symlink("../../devices/usb1/1-2/1-2:1.0/video4linux/video0",
+                                     sys() / "class/video4linux/video0");
+        fs::create_directory_symlink("../..", sys() / "devices/usb1/1-2/1-2:1.0/video4linux/video0/device");
+        rig_ = gpio_rig();
+        rig_.lamps_driver = "usb";
+        rig_.camera.device = (folder_.path() / "dev/video0").string();
+    }
+    fs::path sys() const { return folder_.path() / "sys"; }
+    void write(const fs::path& file, const std::string& text) const {
+        fs::create_directories((folder_.path() / file).parent_path());
+        std::ofstream(folder_.path() / file) << text << "\n";
+    }
+    void device(const std::string& place, const std::vector<std::pair<std::string, std::string>>& files) const {
+        for (const auto& [name, text] : files) write("sys/devices/usb1/" + place + "/" + name, text);
+        fs::create_directories(sys() / "bus/usb/devices");
+        fs::create_directory_symlink("../../../devices/usb1/" + place, sys() / "bus/usb/devices" / place);
+    }
+    void power(const std::string& place, const std::string& control, const std::string& delay) const {
+        write("sys/devices/usb1/" + place + "/power/control", control);
+        write("sys/devices/usb1/" + place + "/power/autosuspend_delay_ms", delay);
+    }
+    Diagnoses looked(bool udev_rules = false) const {
+        MachineSeen machine = good_machine();
+        machine.udev_rules = udev_rules;
+        look_at_usb(rig_, machine, sys());
+        return diagnose_usb_power(machine);
+    }
+
+    const test::TemporaryFolder folder_;
+    RigDescription rig_;
+};
+
+TEST_F(DoctorOnUsb, SaysHowToKeepItsDevicesAwake) {
+    power("1-2", "auto", "2000");
+    power("1-3", "on", "2000");
+    const Diagnoses found = looked();
+    ASSERT_EQ(found.size(), 2U);
+    EXPECT_EQ(found[0].subject, "lamp controller's power");
+    EXPECT_EQ(found[0].verdict, Verdict::good);
+    EXPECT_EQ(found[1].subject, "camera's power");
+    EXPECT_EQ(found[1].verdict, Verdict::warning);
+    EXPECT_THAT(found[1].found, HasSubstr("autosuspend"));
+    EXPECT_THAT(found[1].remedy, HasSubstr("echo on | sudo tee " + fs::canonical(sys() / "devices/usb1/1-2").string() +
+                                           "/power/control"));
+    EXPECT_THAT(found[1].remedy, HasSubstr("install darkbox-daemon"));
+    EXPECT_THAT(looked(true)[1].remedy, HasSubstr("udevadm trigger"));
+    power("1-3", "auto", "0");
+    EXPECT_EQ(looked()[0].verdict, Verdict::warning);
+}
+
+TEST_F(DoctorOnUsb, IsContentWithWhatStaysAwake) {
+    power("1-2", "on", "2000");
+    power("1-3", "auto", "-1000");  // never
+    for (const Diagnosis& d : looked()) EXPECT_EQ(d.verdict, Verdict::good) << d.subject;
+    rig_.lamps_driver = "gpio";
+    rig_.camera.device = (folder_.path() / "dev/none").string();
+    EXPECT_TRUE(looked().empty());
+}
+
+TEST_F(DoctorOnUsb, KnowsTheCamerasBus) {
+    MachineSeen machine = good_machine();
+    look_at_usb(rig_, machine, sys());
+    EXPECT_EQ(machine.camera_bus_mbit, 480);
+    ASSERT_EQ(machine.boards.size(), 1U);
+}
+
 TEST(Doctor, MeasuresTheDisk) {
     const test::TemporaryFolder folder;
     const Diagnoses good = diagnose_disk(gpio_rig(), folder.path() / "sessions");

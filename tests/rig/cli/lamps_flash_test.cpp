@@ -1,5 +1,5 @@
-// `darkbox lamps flash` with the real image on the emulated board; the chip's loader is played by a script that notes
-// what it was asked.
+// `darkbox lamps flash` with the real image on the emulated board; what writes the chip through its loader is played by
+// scripts that note what they were asked.
 #include <gmock/gmock.h>
 
 #include <filesystem>
@@ -24,8 +24,10 @@ class LampsFlash : public testing::Test {
 protected:
     LampsFlash() {
         fs::create_directory(bin_);
-        std::ofstream(bin_ / "dfu-programmer") << "#!/bin/sh\necho \"$*\" >> \"" << log_.string() << "\"\n";
-        fs::permissions(bin_ / "dfu-programmer", fs::perms::owner_all);
+        for (const char* programmer : {"dfu-programmer", "avrdude"}) {
+            std::ofstream(bin_ / programmer) << "#!/bin/sh\necho \"$*\" >> \"" << log_.string() << "\"\n";
+            fs::permissions(bin_ / programmer, fs::perms::owner_all);
+        }
         path_ = std::getenv("PATH");
         setenv("PATH", (bin_.string() + ":" + path_).c_str(), 1);
     }
@@ -98,6 +100,42 @@ TEST_F(LampsFlash, ANewBoardGetsFirmwareAndIdentity) {
     LampController board({.serial = "LC-0042"});
     EXPECT_EQ(board.info().lamps, 48);
     EXPECT_STREQ(board.identity().label, "dome 64");
+}
+
+TEST_F(LampsFlash, ByAvrdudeTheUserStartsTheBoard) {
+    if (!test::UsbTestbed::available()) GTEST_SKIP() << "runs under umockdev-wrapper";
+    test::UsbTestbed bed;
+    bed.plug_in(DARKBOX_LAMP_ELF, std::nullopt);
+    const Ended ended = flash({DARKBOX_LAMP_HEX, "--serial", "LC-0042", "--programmer", "avrdude"});
+    ASSERT_EQ(ended.status, 0) << ended.err;
+    EXPECT_EQ(programmed(), "-c flip1 -p m32u4 -U flash:w:" DARKBOX_LAMP_HEX ":i\n");
+    EXPECT_THAT(ended.err, HasSubstr("press the board's reset button"));
+    EXPECT_THAT(ended.out, HasSubstr("'LC-0042' runs firmware"));
+}
+
+/// What avrdude itself makes of these words: it looks for the chip's loader, and finds none here.
+TEST_F(LampsFlash, AvrdudeUnderstandsWhatItIsTold) {
+    if (!test::UsbTestbed::available()) GTEST_SKIP() << "runs under umockdev-wrapper";
+    if (!fs::exists("/usr/bin/avrdude")) GTEST_SKIP() << "avrdude is not installed";
+    test::UsbTestbed bed;
+    fs::remove(bin_ / "avrdude");
+    const Ended ended = flash({DARKBOX_LAMP_HEX, "--serial", "LC-0042", "--programmer", "avrdude"});
+    EXPECT_EQ(ended.status, 1);
+    EXPECT_THAT(ended.err, HasSubstr("no matching USB device found"));
+    EXPECT_THAT(ended.err,
+                HasSubstr("avrdude -c flip1 -p m32u4 -U flash:w:" DARKBOX_LAMP_HEX ":i ended with status 1"));
+    EXPECT_THAT(ended.err, HasSubstr("bootloader button"));
+}
+
+TEST_F(LampsFlash, AMissingProgrammerIsNamed) {
+    if (!test::UsbTestbed::available()) GTEST_SKIP() << "runs under umockdev-wrapper";
+    test::UsbTestbed bed;
+    setenv("PATH", (bin_ / "empty").c_str(), 1);
+    for (const std::string programmer : {"dfu-programmer", "avrdude"}) {
+        const Ended ended = flash({DARKBOX_LAMP_HEX, "--programmer", programmer});
+        EXPECT_EQ(ended.status, 1);
+        EXPECT_THAT(ended.err, HasSubstr("apt-get install " + programmer));
+    }
 }
 
 TEST_F(LampsFlash, AnotherBoardThanTheNamedOneIsLeftAlone) {

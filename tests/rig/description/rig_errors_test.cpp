@@ -130,6 +130,41 @@ INSTANTIATE_TEST_SUITE_P(
                            "rig.toml:24: [[lamps.lamp]] max_on_s is 0.02; allowed: more than"},
                     BadRig{"name", with("name = \"b\"", "name = \"../b\""), "cannot be part of a file name"}));
 
+/// The good rig with one more section.
+std::string and_section(const std::string& text) { return with("[processing]", text + "\n[processing]"); }
+
+INSTANTIATE_TEST_SUITE_P(
+    Health, RigErrors,
+    testing::Values(
+        BadRig{"good", and_section("[health]\nwarm_up = \"wait\"\nwarm_up_s = 300\nhottest_c = 60"), "no error"},
+        BadRig{"rule", and_section("[health]\nwarm_up = \"maybe\""), "rig.toml:11: [health] has warm_up = \"maybe\""},
+        BadRig{"none", and_section("[health]\nwarm_up = \"none\""), "has warm_up = \"none\""},
+        BadRig{"nobody_waits", and_section("[health]\nwarm_up = \"warn\"\nwarm_up_s = 300"),
+               "has warm_up_s, but nothing that waits"},
+        BadRig{"nobody_looks", and_section("[health]\nsteady_level = 0.001"), "has steady_level without warm_up"},
+        BadRig{"level", and_section("[health]\nwarm_up = \"wait\"\nsteady_level = 0"), "steady_level is 0; allowed"},
+        BadRig{"cold", and_section("[health]\nhottest_c = -3"), "hottest_c is -3; allowed: 20 to 120"},
+        BadRig{"no_thermometer", real("") + "[health]\nhottest_c = 60\n", "lamps have no thermometer"}));
+
+TEST(RigHealth, IsReadAndLooksAtNothingUnlessAsked) {
+    EXPECT_EQ(parse_rig(good, "").health.warm_up, WarmUpRule::none);
+    EXPECT_FALSE(parse_rig(good, "").health.hottest_c);
+    const RigDescription rig = parse_rig(
+        and_section("[health]\nwarm_up = \"wait\"\nwarm_up_s = 300\nsteady_level = 0.001\nhottest_c = 60"), "");
+    EXPECT_EQ(rig.health.warm_up, WarmUpRule::wait);
+    EXPECT_EQ(rig.health.warm_up_longest, Seconds(300));
+    EXPECT_EQ(rig.health.steady_level, 0.001);
+    EXPECT_EQ(rig.health.hottest_c, 60);
+}
+
+INSTANTIATE_TEST_SUITE_P(Tls, RigErrors,
+                         testing::Values(BadRig{"good", with("socket = \"s\"", "certificate = \"c\"\nkey = \"k\""),
+                                                "no error"},
+                                         BadRig{"no_key", with("socket = \"s\"", "certificate = \"c\""),
+                                                "rig.toml:12: [api] has certificate without key"},
+                                         BadRig{"no_certificate", with("socket = \"s\"", "key = \"k\""),
+                                                "[api] has key without certificate"}));
+
 INSTANTIATE_TEST_SUITE_P(RealCamera, RigErrors,
                          testing::Values(BadRig{"good", real("format = \"Y16\""), "no error"},
                                          BadRig{"simulated", with("exposure_ms = 20", "frame_rate = 20"),

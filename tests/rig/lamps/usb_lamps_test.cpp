@@ -84,6 +84,7 @@ TEST_F(UsbLampsTest, LightOneLampAndDarken) {
     lamps.dark();
     EXPECT_EQ(lit(), 0U);
     EXPECT_TRUE(lamps.health().problems.empty());
+    EXPECT_NEAR(lamps.health().temperature_c.value_or(0), 25, 0.5);  // of the board's thermistor, at half scale
     EXPECT_THROW(lamps.light(LampId{8}, 1.0), std::invalid_argument);
     EXPECT_THROW(lamps.light(LampId{1}, 0.0), std::invalid_argument);
 }
