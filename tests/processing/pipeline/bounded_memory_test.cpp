@@ -5,23 +5,35 @@
 #include <chrono>
 #include <cstring>
 #include <filesystem>
+#include <opencv2/imgproc.hpp>
+#include <string>
 
 #include "acquisition/session/session_writer.h"
+#include "processing/formats/atomic_file.h"
 #include "processing/formats/png.h"
+#include "processing/normals/integrate.h"
+#include "processing/normals/integration_memory.h"
+#include "processing/pipeline/evaluate.h"
 #include "processing/pipeline/import.h"
 #include "processing/pipeline/photographs_seen.h"
 #include "processing/pipeline/radiance.h"
 #include "processing/pipeline/session_ball.h"
 #include "processing/pipeline/session_files.h"
 #include "processing/pipeline/stack.h"
+#include "processing/pipeline/stages.h"
 #include "tests/processing/pipeline/synthetic_photographs.h"
 #include "tests/support/peak_memory.h"
 #include "tests/support/test_data.h"
+#include "tests/support/textured_sphere.h"
+#include "tests/support/throws.h"
 
 namespace darkbox {
 namespace {
 
 namespace fs = std::filesystem;
+
+using testing::AllOf;
+using testing::HasSubstr;
 
 bool same_bits(const cv::Mat& a, const cv::Mat& b) {
     if (a.size() != b.size() || a.type() != b.type()) return false;
@@ -177,6 +189,51 @@ TEST(ManyPhotographs, ReadingABallTakesItsPartsAndNotTheFrames) {
     if (!mib) GTEST_SKIP() << "the peak of memory is not to be had here";
     EXPECT_EQ(parts.front().size(), 24U);
     EXPECT_LT(*mib, 180);
+}
+
+/// With lights that came along, and an object that fills the picture.
+TEST(TooLittleMemory, ForHeightOrEvaluationIsSaidBeforeTheyBegin) {
+    test::TemporaryFolder folder;
+    const fs::path photographs = folder.path() / "photos";
+    fs::create_directories(photographs);
+    const Lights lights = test::lamp_ring();
+    test::write_photographs(photographs, lights);
+    write_png(folder.path() / "white.png", cv::Mat1b(80, 96, uchar{255}));
+    std::string directions;
+    for (const Light& light : lights)
+        directions += fmt::format("{} {} {}\n", light.direction.x(), light.direction.y(), light.direction.z());
+    write_file(folder.path() / "lights.txt", directions);
+    ImportOptions import;
+    import.folders = {photographs};
+    import.mask = folder.path() / "white.png";
+    import.lights = folder.path() / "lights.txt";
+    import.transfer = ImportTransfer::linear;
+    import.out = folder.path() / "s";
+    const Session session = import_photographs(import);
+    run_calibrate(session);
+    NormalsOptions normals;
+    normals.stereo.memory_mib = 1;
+    EXPECT_THAT(test::input_error_of([&] { run_normals(session, normals); }),
+                AllOf(HasSubstr("memory_mib is 1"), HasSubstr("96x80 pixels needs 2")));
+    EXPECT_FALSE(fs::exists(ResultFiles(session.folder()).normals));
+    normals.surface = false;
+    run_normals(session, normals);
+    EvaluateOptions evaluate;
+    evaluate.memory_mib = 1;
+    EXPECT_THAT(test::input_error_of([&] { evaluate_session(session, evaluate); }),
+                HasSubstr("evaluating 7 photographs of 96x80 pixels needs 4"));
+}
+
+TEST(IntegrationBytes, AreNoFewerThanTheIntegrationTakes) {
+    const NormalMap normals = test::textured_sphere(600, 1).normals;
+    const test::PeakMemory peak;
+    const HeightMap height = integrate_normals({normals, {}});
+    const auto mib = peak.mib();
+    if (!mib) GTEST_SKIP() << "the peak of memory is not to be had here";
+    const cv::Rect box = cv::boundingRect(height.valid);
+    const double given_back = 6.0 * static_cast<double>(height.valid.total());
+    EXPECT_LT(*mib, (static_cast<double>(integration_bytes(box.size())) + given_back) / (1 << 20));
+    EXPECT_GT(*mib, 0.5 * static_cast<double>(integration_bytes(box.size())) / (1 << 20)) << "the figure is too large";
 }
 
 TEST(ManyPhotographs, AreHeldToBeReducedOnlyAsFarAsHalfAGibibyteGoes) {
