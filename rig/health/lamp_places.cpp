@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <set>
 
+#include "processing/calibration/ball_photographs.h"
 #include "processing/calibration/ball_search.h"
 #include "processing/calibration/highlight.h"
 #include "processing/calibration/locate.h"
@@ -17,7 +18,6 @@ namespace darkbox {
 namespace {
 
 constexpr std::size_t most_searched = 12;  ///< frames in which the ball is looked for
-constexpr double box_margin = 1.3;         ///< of the ball's radius: what find_highlights() needs to see
 constexpr double outline_sigma_px = 0.25;  ///< of the outline, lamp by lamp: what all share is a turn of the whole
 constexpr double knock_worth_words_deg = 2.0;
 constexpr double fewest_in_place = 0.5;
@@ -43,27 +43,15 @@ std::optional<Ball> ball_in(const std::vector<LampPicture>& pictures) {
     if (found.empty()) return std::nullopt;
     CalibrationOptions options;
     options.balls = {found.front()};  // its outline is then fitted
-    return locate_balls(frames, options).front().ball;
+    BallFramesInMemory in_memory(frames);
+    return locate_balls(in_memory, options).front().ball;
 }
 
 std::vector<std::optional<Highlight>> highlights_of(const std::vector<LampPicture>& pictures, const Ball& ball) {
-    const double half = box_margin * ball.radius + 2;
-    const cv::Rect box = cv::Rect(cv::Point(cv::Point2d(ball.x - half, ball.y - half)),
-                                  cv::Point(cv::Point2d(ball.x + half, ball.y + half))) &
-                         cv::Rect({}, pictures.front().light.size());
-    std::vector<cv::Mat3f> frames;
-    for (const LampPicture& picture : pictures) frames.push_back(as_colour(picture.light(box)));
-    Ball inside = ball;
-    inside.x -= box.x;
-    inside.y -= box.y;
+    BallParts parts{mirror_box(ball, pictures.front().light.size()), {}};
+    for (const LampPicture& picture : pictures) parts.frames.push_back(as_colour(picture.light(parts.box)));
     std::vector<std::optional<Highlight>> highlights;
-    for (HighlightReading& reading : find_highlights(frames, inside)) {
-        if (reading.highlight) {
-            reading.highlight->u += box.x;
-            reading.highlight->v += box.y;
-        }
-        highlights.push_back(reading.highlight);
-    }
+    for (HighlightReading& reading : find_highlights(parts, ball)) highlights.push_back(reading.highlight);
     return highlights;
 }
 
