@@ -13,6 +13,7 @@
 #include "processing/formats/picture.h"
 #include "processing/formats/png.h"
 #include "processing/maps/parallel.h"
+#include "processing/pipeline/ball_focus.h"
 #include "processing/pipeline/ball_picture.h"
 #include "processing/pipeline/given_lights.h"
 #include "processing/pipeline/intensities.h"
@@ -251,6 +252,7 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
         require_highlights(session, summary.calibration, options.calibration.drop);
         if (!wanted.object) hold_at_object(session, ball, summary.calibration, work);
         append(summary.calibration.warnings, unused_geometry(session, wanted));
+        summary.blur_px = ball_blur_px(ball.frames, summary.calibration.balls);
         summary.seconds.solve = watch.lap();
         const BallView view = view_of_balls(ball.frames, summary.calibration.balls);
         write_png(files.ball_picture, draw_balls(view, summary.calibration));

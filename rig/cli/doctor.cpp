@@ -90,8 +90,15 @@ Diagnoses diagnose_camera(const RigDescription& rig, const MachineSeen& machine)
         case Access::open:
             return {{subject, Verdict::good, "there, and open to " + machine.user}};
         case Access::denied:
-            return {{subject, Verdict::bad, fmt::format("there, but {} may not use it", machine.user),
-                     join_group(machine, machine.camera_group)}};
+            return {
+                {subject, Verdict::bad, fmt::format("there, but {} may not use it", machine.user),
+                 machine.camera_group != "root" ? join_group(machine, machine.camera_group)
+                 : machine.udev_rules
+                     ? "it belongs to root alone: sudo udevadm trigger gives it to the group video; then " +
+                           join_group(machine, "video")
+                     : "it belongs to root alone: install darkbox-daemon, whose udev rule gives cameras to the group "
+                       "video; then " +
+                           join_group(machine, "video")}};
         case Access::absent:
             break;
     }

@@ -91,7 +91,9 @@ CommandResult doctor(const DoctorArguments& a) {
     }
     result.json["bad"] = bad;
     result.text.pop_back();
-    if (bad > 0) result.warnings.push_back(fmt::format("{} things must be put right before this rig can capture", bad));
+    if (bad > 0)
+        result.warnings.push_back(fmt::format("{} must be put right before this rig can capture",
+                                              bad == 1 ? "one thing" : fmt::format("{} things", bad)));
     return result;
 }
 

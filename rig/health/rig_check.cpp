@@ -8,11 +8,11 @@
 
 #include "acquisition/frame/error.h"
 #include "processing/calibration/ball_search.h"
+#include "processing/calibration/sharpness.h"
 #include "rig/health/flicker.h"
 #include "rig/health/lamp_spots.h"
 #include "rig/health/linearity.h"
 #include "rig/health/probe.h"
-#include "rig/health/sharpness.h"
 
 namespace darkbox {
 namespace {

@@ -72,6 +72,12 @@ TEST(Doctor, SaysWhatToDoWithoutPermission) {
     machine.groups = {"eva"};
     machine.camera = Access::denied;
     EXPECT_THAT(only_bad(diagnose_camera(gpio_rig(), machine)).remedy, HasSubstr("usermod -aG video eva"));
+    machine.camera_group = "root";  // nobody should join that
+    EXPECT_THAT(only_bad(diagnose_camera(gpio_rig(), machine)).remedy, HasSubstr("udevadm trigger"));
+    EXPECT_THAT(only_bad(diagnose_camera(gpio_rig(), machine)).remedy, HasSubstr("usermod -aG video eva"));
+    machine.udev_rules = false;
+    EXPECT_THAT(only_bad(diagnose_camera(gpio_rig(), machine)).remedy, HasSubstr("install darkbox-daemon"));
+    machine.udev_rules = true;
     machine.chips = {{.device = "/dev/gpiochip0", .access = Access::denied}};
     const Diagnosis denied = only_bad(diagnose_lamps(gpio_rig(), machine));
     EXPECT_THAT(denied.found, HasSubstr("eva may not open /dev/gpiochip0"));

@@ -1,4 +1,4 @@
-#include "rig/health/sharpness.h"
+#include "processing/calibration/sharpness.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,11 +8,10 @@
 namespace darkbox {
 namespace {
 
-constexpr double again_px = 1.0;          ///< the second blur
-constexpr double strong_share = 0.3;      ///< of the strongest slope: edges from here on are looked at
-constexpr double sharpest_share = 0.15;   ///< of those edges
-constexpr double slopes_of_noise = 8.0;   ///< an edge is this much steeper than noise
-constexpr std::size_t fewest_edges = 20;  ///< pixels
+constexpr double again_px = 1.0;         ///< the second blur
+constexpr double strong_share = 0.3;     ///< of the strongest slope: edges from here on are looked at
+constexpr double sharpest_share = 0.15;  ///< of those edges
+constexpr double slopes_of_noise = 8.0;  ///< an edge is this much steeper than noise
 
 cv::Mat1f slopes(const cv::Mat1f& picture) {
     cv::Mat1f dx, dy, result;
@@ -36,7 +35,7 @@ bool is_crest(const cv::Mat1f& slope, int v, int u) {
 
 }  // namespace
 
-std::optional<double> measure_blur(const cv::Mat1f& picture, const cv::Mat1b& mask) {
+std::optional<double> measure_blur(const cv::Mat1f& picture, const cv::Mat1b& mask, std::size_t fewest_edges) {
     cv::Mat1f softer;
     cv::GaussianBlur(picture, softer, {}, again_px);
     const cv::Mat1f slope = slopes(picture), soft_slope = slopes(softer);

@@ -1,4 +1,4 @@
-#include "rig/health/sharpness.h"
+#include "processing/calibration/sharpness.h"
 
 #include <gtest/gtest.h>
 
