@@ -8,12 +8,10 @@
 #include "processing/calibration/circle_fit.h"
 #include "processing/calibration/edges.h"
 #include "processing/calibration/glint.h"
-#include "processing/calibration/outline.h"
 
 namespace darkbox {
 namespace {
 
-constexpr int working_side = 1024;  ///< px; the search runs on pictures no longer than this
 constexpr double least_radius = 7;  ///< px
 constexpr double radius_step = 1.04;
 constexpr double cell_share = 0.03;  ///< a cell of the vote is this share of the radius wide
@@ -186,7 +184,10 @@ bool lit_alike(const Candidate& a, const Candidate& b) {
 }  // namespace
 
 std::vector<Ball> find_balls(const std::vector<cv::Mat3f>& frames) {
-    const ReducedFrames reduced = reduce(frames, working_side);
+    return find_balls(reduce(frames, ball_search_side));
+}
+
+std::vector<Ball> find_balls(const ReducedFrames& reduced) {
     cv::Mat1f mean(reduced.images.front().size(), 0.0F);
     for (const cv::Mat1f& image : reduced.images) mean += image / static_cast<double>(reduced.images.size());
     const std::vector<Candidate> candidates = judged(reduced.images, find_edges(compress(mean)));

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "processing/calibration/calibration.h"
+#include "processing/calibration/outline.h"
 
 namespace darkbox {
 
@@ -15,5 +16,9 @@ namespace darkbox {
 /// times the share of frames with a lamp's glint in it. Balls stand in the light of the same lamps: a circle whose
 /// glints do not lie as the surest ball's do is not one.
 std::vector<Ball> find_balls(const std::vector<cv::Mat3f>& frames);
+/// The same in frames that were reduced to `ball_search_side`.
+std::vector<Ball> find_balls(const ReducedFrames& reduced);
+
+inline constexpr int ball_search_side = 1024;  ///< px; the search runs on pictures no longer than this
 
 }  // namespace darkbox

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "acquisition/frame/error.h"
+#include "processing/calibration/ball_photographs.h"
 #include "processing/calibration/first_lights.h"
 #include "processing/calibration/highlight.h"
 #include "processing/calibration/locate.h"
@@ -24,11 +25,15 @@ constexpr double size_mismatch = 0.03;         ///< of the diameter: the scale o
 
 using Readings = std::vector<std::optional<Highlight>>;  // one per frame
 
-void require_frames(const std::vector<cv::Mat3f>& frames, const std::vector<std::string>& files) {
-    if (frames.empty()) throw InputError("there are no frames of the ball", "give at least three, one per lamp");
-    if (frames.size() != files.size())
-        throw InputError(fmt::format("{} ball frames but {} names", frames.size(), files.size()),
+void require_a_name_for_each(std::size_t frames, const std::vector<std::string>& files) {
+    if (frames == 0) throw InputError("there are no frames of the ball", "give at least three, one per lamp");
+    if (frames != files.size())
+        throw InputError(fmt::format("{} ball frames but {} names", frames, files.size()),
                          "give one name for each frame");
+}
+
+void require_frames(const std::vector<cv::Mat3f>& frames, const std::vector<std::string>& files) {
+    require_a_name_for_each(frames.size(), files);
     for (std::size_t i = 0; i < frames.size(); ++i)
         if (frames[i].empty() || frames[i].size() != frames.front().size())
             throw InputError(fmt::format("{} is {}x{} pixels but {} is {}x{}", files[i], frames[i].cols, frames[i].rows,
@@ -72,14 +77,19 @@ std::size_t ball_at(const cv::Point2d& at, const std::string& file, const std::v
 }
 
 /// What the frames show on every ball, by hand where the user read it.
-std::vector<std::vector<HighlightReading>> read_balls(const std::vector<cv::Mat3f>& frames,
+std::vector<std::vector<HighlightReading>> read_balls(BallPhotographs& photographs,
                                                       const std::vector<std::string>& files,
                                                       const std::vector<LocatedBall>& balls,
                                                       const CalibrationOptions& options) {
+    std::vector<cv::Rect> boxes;
+    for (const LocatedBall& located : balls) boxes.push_back(mirror_box(located.ball, photographs.size()));
+    std::vector<std::vector<cv::Mat3f>> frames = photographs.parts(boxes);
     std::vector<std::vector<HighlightReading>> readings;
-    for (const LocatedBall& located : balls)
-        readings.push_back(options.method == CalibrationMethod::refined ? find_highlights(frames, located.ball)
-                                                                        : find_brightest(frames, located.ball));
+    for (std::size_t b = 0; b < balls.size(); ++b) {
+        const BallParts parts{boxes[b], std::move(frames[b])};
+        readings.push_back(options.method == CalibrationMethod::refined ? find_highlights(parts, balls[b].ball)
+                                                                        : find_brightest(parts, balls[b].ball));
+    }
     for (const auto& [file, at] : options.highlights)
         readings[ball_at(at, file, balls)][index_of(file, files)] = {Highlight{at.x, at.y, hand_sigma_px, false}, "",
                                                                      0};
@@ -338,14 +348,22 @@ Calibration calibrate(const std::vector<cv::Mat3f>& frames, const std::vector<st
                       const CalibrationOptions& options) {
     options.validate();
     require_frames(frames, files);
+    BallFramesInMemory photographs(frames);
+    return calibrate(photographs, files, options);
+}
+
+Calibration calibrate(BallPhotographs& photographs, const std::vector<std::string>& files,
+                      const CalibrationOptions& options) {
+    options.validate();
+    require_a_name_for_each(photographs.count(), files);
     require_names(options, files);
-    const cv::Size size = frames.front().size();
+    const cv::Size size = photographs.size();
 
     Calibration calibration;
     calibration.lights = unread_lights(files);
-    std::vector<LocatedBall> balls = locate_balls(frames, options);
+    std::vector<LocatedBall> balls = locate_balls(photographs, options);
     warn_of_lost_outlines(balls, options, calibration);
-    auto readings = read_balls(frames, files, balls, options);
+    auto readings = read_balls(photographs, files, balls, options);
     for (const std::string& file : options.drop)
         calibration.rejected.push_back(fmt::format("{}: left out as asked", file));
     drop_dull_balls(balls, readings, calibration);

@@ -134,10 +134,65 @@ void pair_directions(Comparison& c) {
     }
 }
 
+/// The chance allowed to each of so many judgements.
+double chance_each(const DriftOptions& options, std::size_t judgements) {
+    return 1 - std::pow(1 - options.false_alarm, 1 / static_cast<double>(std::max<std::size_t>(1, judgements)));
+}
+
+/// A near lamp's distance from the object.
+struct Distance {
+    double mm = 0;
+    double variance = 0;  ///< mm^2; 0: not known
+};
+
+Distance distance_of(const LampPosition& lamp, const Eigen::Vector3d& object_mm) {
+    const Eigen::Vector3d ray = lamp.position_mm - object_mm;
+    const Eigen::Vector3d unit = ray.normalized();
+    return {ray.norm(), unit.dot(lamp.covariance_mm2 * unit)};
+}
+
+struct DistancePair {
+    std::size_t match = 0;  ///< place in Comparison::matches
+    Distance before, after;
+};
+
+std::vector<DistancePair> pair_distances(const Comparison& c) {
+    std::vector<DistancePair> pairs;
+    for (const std::size_t i : c.read) {
+        const auto &a = c.light_before(c.matches[i]).near, &b = c.light_after(c.matches[i]).near;
+        if (a && b) pairs.push_back({i, distance_of(*a, a->object_mm), distance_of(*b, a->object_mm)});
+    }
+    return pairs;
+}
+
+/// What all distances grew by: the scale was read otherwise, off one ball for all lamps.
+double common_scale(const std::vector<DistancePair>& pairs) {
+    std::vector<double> ratios;
+    for (const DistancePair& pair : pairs) ratios.push_back(pair.after.mm / std::max(pair.before.mm, 1e-9));
+    const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+    std::nth_element(ratios.begin(), middle, ratios.end());
+    return *middle;
+}
+
+/// Near lamps that moved along the line on which they are seen: no direction tells.
+void judge_distances(const Comparison& c, std::vector<LampDrift>& lamps) {
+    const std::vector<DistancePair> pairs = pair_distances(c);
+    if (pairs.empty()) return;
+    const double scale = common_scale(pairs);
+    const double allowed = chance_each(c.options, c.pairs.size() + pairs.size());
+    for (const DistancePair& pair : pairs) {
+        LampDrift& lamp = lamps[pair.match];
+        lamp.farther_mm = pair.after.mm - scale * pair.before.mm;
+        if (!(pair.before.variance > 0 && pair.after.variance > 0)) continue;
+        lamp.farther_sigma_mm = std::sqrt(pair.after.variance + scale * scale * pair.before.variance);
+        const double chance = std::erfc(std::abs(*lamp.farther_mm) / (std::numbers::sqrt2 * lamp.farther_sigma_mm));
+        if (chance < allowed && lamp.finding == LampFinding::steady) lamp.finding = LampFinding::moved;
+    }
+}
+
 /// Each lamp by itself: how far, and whether by chance.
 void judge_movement(const Comparison& c, std::vector<LampDrift>& lamps) {
-    const auto lamps_judged = static_cast<double>(std::max<std::size_t>(1, c.pairs.size()));
-    const double per_lamp = 1 - std::pow(1 - c.options.false_alarm, 1 / lamps_judged);
+    const double per_lamp = chance_each(c.options, c.pairs.size() + pair_distances(c).size());
     for (std::size_t i = 0; i < c.pairs.size(); ++i) {
         LampDrift& lamp = lamps[c.read[i]];
         const auto others = c.common ? without(*c.common, c.pairs, i) : std::nullopt;
@@ -261,6 +316,7 @@ Drift drift_between(const RigLights& before, const RigLights& after, const Drift
     judge_movement(c, drift.lamps);
     tell_swaps_apart(c, drift.lamps);
     tell_new_duplicates(c, drift.lamps);
+    judge_distances(c, drift.lamps);
     judge_intensities(c, drift.lamps);
     drift.findings = words_of(drift);
     return drift;

@@ -55,8 +55,12 @@ struct LampDrift {
     double sigma_deg = 0;                       ///< of moved_deg per tangent axis
     double p_value = 1;                         ///< of moving as far by chance: chi-squared, two degrees of freedom
     bool sigma_assumed = false;                 ///< one of the calibrations did not know its covariance
-    std::string partner;                        ///< the other lamp of a swap or duplicate
-    std::optional<double> intensity_ratio;      ///< after over before, the median lamp's being 1
+    /// Near lamps: how much farther from the object than before, mm, less what the scale changed for all of them; its
+    /// standard deviation, 0 where a position's covariance is not known.
+    std::optional<double> farther_mm;
+    double farther_sigma_mm = 0;
+    std::string partner;                    ///< the other lamp of a swap or duplicate
+    std::optional<double> intensity_ratio;  ///< after over before, the median lamp's being 1
 };
 
 /// Every direction turned alike: the camera was knocked, or the dome as a whole.
@@ -79,8 +83,9 @@ struct Drift {
 /// Compares two calibrations of one rig, lamp by lamp, matched by name. A common rotation is fitted robustly; where it
 /// is significant and a majority of lamps follow it, it is the camera's, and each lamp is judged by what remains
 /// against the rotation of the others. Errors of one ball turn all lamps together, so the rotation must exceed what
-/// one single lamp's uncertainty would explain. Near lamps are compared as the first calibration's object sees them.
-/// Throws InputError for calibrations of different rigs, and for a lamp that is near in one and distant in the other.
+/// one single lamp's uncertainty would explain. Near lamps are compared as the first calibration's object sees them,
+/// and by their distances from it, where these are known. Throws InputError for calibrations of different rigs, and for
+/// a lamp that is near in one and distant in the other.
 Drift drift_between(const RigLights& before, const RigLights& after, const DriftOptions& options = {});
 
 }  // namespace darkbox

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace darkbox {
 namespace {
@@ -24,6 +25,14 @@ std::string uncertainty(const LampDrift& lamp) {
                        lamp.sigma_deg);
 }
 
+/// Nothing where a lamp is distant, or its distance is not known well enough to speak of.
+std::string distance_in_words(const LampDrift& lamp) {
+    if (!lamp.farther_mm || !(std::abs(*lamp.farther_mm) > 2 * lamp.farther_sigma_mm && lamp.farther_sigma_mm > 0))
+        return {};
+    return fmt::format(" and stands {:.0f} mm {} (uncertainty {:.2g})", std::abs(*lamp.farther_mm),
+                       *lamp.farther_mm > 0 ? "farther" : "nearer", lamp.farther_sigma_mm);
+}
+
 bool mutual(const LampDrift& lamp, const std::vector<LampDrift>& lamps) {
     return std::any_of(lamps.begin(), lamps.end(), [&](const LampDrift& other) {
         return other.lamp == lamp.partner && other.partner == lamp.lamp && other.finding == lamp.finding;
@@ -40,8 +49,8 @@ std::string in_words(const LampDrift& lamp, const std::vector<LampDrift>& lamps)
     switch (lamp.finding) {
         case LampFinding::moved: {
             const std::string where = lamp.partner.empty() ? "" : fmt::format(" to where {} was", lamp.partner);
-            return fmt::format("{} moved by {:.2f} degrees{} ({})", lamp.lamp, lamp.moved_deg, where,
-                               uncertainty(lamp));
+            return fmt::format("{} moved by {:.2f} degrees{} ({}){}", lamp.lamp, lamp.moved_deg, where,
+                               uncertainty(lamp), distance_in_words(lamp));
         }
         case LampFinding::swapped:
             return swap_in_words(lamp, lamps);

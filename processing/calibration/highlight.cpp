@@ -29,13 +29,10 @@ struct Zone {
     double area = 0;
 };
 
-Zone mirror_zone_of(const Ball& ball, cv::Size size) {
+Zone mirror_zone_of(const Ball& ball, const cv::Rect& box) {
     const double reach = mirror_zone * ball.radius;
-    const double half = reach + margin_px;
-    const cv::Point from(static_cast<int>(std::floor(ball.x - half)), static_cast<int>(std::floor(ball.y - half)));
-    const cv::Point to(static_cast<int>(std::ceil(ball.x + half)) + 1, static_cast<int>(std::ceil(ball.y + half)) + 1);
     Zone zone;
-    zone.box = cv::Rect(from, to) & cv::Rect({}, size);
+    zone.box = box;
     zone.inside = cv::Mat1b(zone.box.size(), uchar{0});
     for (int y = 0; y < zone.box.height; ++y)
         for (int x = 0; x < zone.box.width; ++x)
@@ -77,10 +74,9 @@ cv::Mat1f standing_light(const std::vector<ZoneImage>& images) {
     return standing;
 }
 
-std::vector<ZoneImage> zone_images(const std::vector<cv::Mat3f>& frames, const Zone& zone) {
+std::vector<ZoneImage> zone_images(const std::vector<cv::Mat3f>& frames) {
     std::vector<ZoneImage> images;
-    for (const cv::Mat3f& frame : frames)
-        images.push_back({frame(zone.box), mean_channel(frame(zone.box)), strongest_channel(frame(zone.box)), {}});
+    for (const cv::Mat3f& frame : frames) images.push_back({frame, mean_channel(frame), strongest_channel(frame), {}});
     const cv::Mat1f standing = standing_light(images);
     for (ZoneImage& image : images) image.moving = image.luminance - standing;
     return images;
@@ -286,9 +282,22 @@ HighlightReading read_frame(const std::vector<ZoneImage>& images, const std::vec
 
 }  // namespace
 
+cv::Rect mirror_box(const Ball& ball, cv::Size frame) {
+    const double half = mirror_zone * ball.radius + margin_px;
+    const cv::Point from(static_cast<int>(std::floor(ball.x - half)), static_cast<int>(std::floor(ball.y - half)));
+    const cv::Point to(static_cast<int>(std::ceil(ball.x + half)) + 1, static_cast<int>(std::ceil(ball.y + half)) + 1);
+    return cv::Rect(from, to) & cv::Rect({}, frame);
+}
+
 std::vector<HighlightReading> find_highlights(const std::vector<cv::Mat3f>& frames, const Ball& ball) {
-    const Zone zone = mirror_zone_of(ball, frames.front().size());
-    const std::vector<ZoneImage> images = zone_images(frames, zone);
+    BallParts parts{mirror_box(ball, frames.front().size()), {}};
+    for (const cv::Mat3f& frame : frames) parts.frames.push_back(frame(parts.box));
+    return find_highlights(parts, ball);
+}
+
+std::vector<HighlightReading> find_highlights(const BallParts& parts, const Ball& ball) {
+    const Zone zone = mirror_zone_of(ball, parts.box);
+    const std::vector<ZoneImage> images = zone_images(parts.frames);
     std::vector<FrameSpots> spots;
     std::vector<float> peaks;
     for (const ZoneImage& image : images) {
@@ -297,15 +306,15 @@ std::vector<HighlightReading> find_highlights(const std::vector<cv::Mat3f>& fram
     }
     const double usual = median(peaks);
     std::vector<HighlightReading> readings;
-    for (std::size_t i = 0; i < frames.size(); ++i) readings.push_back(read_frame(images, spots, i, usual, zone, ball));
+    for (std::size_t i = 0; i < images.size(); ++i) readings.push_back(read_frame(images, spots, i, usual, zone, ball));
     return readings;
 }
 
-std::vector<HighlightReading> find_brightest(const std::vector<cv::Mat3f>& frames, const Ball& ball) {
-    const Zone zone = mirror_zone_of(ball, frames.front().size());
+std::vector<HighlightReading> find_brightest(const BallParts& parts, const Ball& ball) {
+    const Zone zone = mirror_zone_of(ball, parts.box);
     std::vector<HighlightReading> readings;
-    for (const cv::Mat3f& frame : frames) {
-        cv::Mat1f image = mean_channel(frame(zone.box));
+    for (const cv::Mat3f& frame : parts.frames) {
+        cv::Mat1f image = mean_channel(frame);
         image.setTo(0, zone.inside == 0);
         double peak = 0;
         cv::minMaxLoc(image, nullptr, &peak);

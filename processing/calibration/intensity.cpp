@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "acquisition/frame/error.h"
+#include "processing/calibration/card_intensity.h"
 
 namespace darkbox {
 namespace {
@@ -106,6 +107,12 @@ void GreyCard::validate() const {
         throw InputError(fmt::format("normal has the length {}", normal.norm()), "allowed: a unit vector");
 }
 
+Eigen::Vector3d intensity_on_card(const cv::Mat3f& frame, const cv::Mat1b& clipped, const Light& light,
+                                  const GreyCard& card) {
+    card.validate();
+    return intensity_of(frame, clipped, light, card, pixels_of(card, frame.size()));
+}
+
 Lights with_intensities_of_card(const std::vector<cv::Mat3f>& frames, const std::vector<cv::Mat1b>& clipped,
                                 Lights lights, const GreyCard& card) {
     card.validate();
@@ -114,7 +121,7 @@ Lights with_intensities_of_card(const std::vector<cv::Mat3f>& frames, const std:
                          "give one frame for each light");
     for (std::size_t i = 0; i < lights.size(); ++i) {
         if (!lights[i].used) continue;
-        lights[i].intensity = intensity_of(frames[i], clipped[i], lights[i], card, pixels_of(card, frames[i].size()));
+        lights[i].intensity = intensity_on_card(frames[i], clipped[i], lights[i], card);
     }
     return with_mean_intensity_one(std::move(lights));
 }

@@ -9,7 +9,6 @@
 #include "acquisition/frame/error.h"
 #include "processing/calibration/ball_contour.h"
 #include "processing/calibration/ball_search.h"
-#include "processing/calibration/outline.h"
 
 namespace darkbox {
 namespace {
@@ -78,9 +77,8 @@ std::vector<LocatedBall> locate_in_mask(const cv::Mat1b& mask, cv::Size size) {
 }
 
 /// A circle given by hand stands; the method `refined` may move it within its uncertainty onto the outline it sees.
-LocatedBall locate_near(const Ball& given, const std::vector<cv::Mat3f>& frames, const cv::Mat1f& mean,
-                        CalibrationMethod method) {
-    require_inside(given, frames.front().size());
+LocatedBall locate_near(const Ball& given, const cv::Mat1f& mean, CalibrationMethod method) {
+    require_inside(given, mean.size());
     LocatedBall located;
     if (method == CalibrationMethod::refined) {
         const BallContour contour = measure_contour(mean, circle_of(given));
@@ -110,14 +108,14 @@ LocatedBall locate_found(const Ball& found, const cv::Mat1f& mean) {
 
 }  // namespace
 
-std::vector<LocatedBall> locate_balls(const std::vector<cv::Mat3f>& frames, const CalibrationOptions& options) {
-    if (options.ball_mask) return locate_in_mask(*options.ball_mask, frames.front().size());
-    const cv::Mat1f mean = mean_over_frames(frames);
+std::vector<LocatedBall> locate_balls(BallPhotographs& photographs, const CalibrationOptions& options) {
+    if (options.ball_mask) return locate_in_mask(*options.ball_mask, photographs.size());
+    const BallOverview overview = photographs.overview(options.balls.empty() ? ball_search_side : 0);
     std::vector<LocatedBall> located;
-    for (const Ball& given : options.balls) located.push_back(locate_near(given, frames, mean, options.method));
+    for (const Ball& given : options.balls) located.push_back(locate_near(given, overview.mean, options.method));
     require_apart(options.balls);
     if (!located.empty()) return located;
-    for (const Ball& found : find_balls(frames)) located.push_back(locate_found(found, mean));
+    for (const Ball& found : find_balls(overview.reduced)) located.push_back(locate_found(found, overview.mean));
     if (located.empty())
         throw InputError("no mirror ball was found in the frames",
                          "say where it is with --ball X,Y,R (pixels), or give --ball-mask");

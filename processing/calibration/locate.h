@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "processing/calibration/ball_photographs.h"
 #include "processing/calibration/calibration.h"
 
 namespace darkbox {
@@ -22,6 +23,6 @@ struct LocatedBall {
 
 /// The balls given by hand, in the mask, or found, best first.
 /// Throws InputError: none is found, one lies outside the picture, two are the same, the mask does not fit.
-std::vector<LocatedBall> locate_balls(const std::vector<cv::Mat3f>& frames, const CalibrationOptions& options);
+std::vector<LocatedBall> locate_balls(BallPhotographs& photographs, const CalibrationOptions& options);
 
 }  // namespace darkbox

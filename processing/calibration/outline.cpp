@@ -33,17 +33,22 @@ cv::Mat1f mean_over_frames(const std::vector<cv::Mat3f>& frames) {
     return mean;
 }
 
+Reduction::Reduction(cv::Size size, int max_side)
+    : scale_(std::max(1.0, static_cast<double>(std::max(size.width, size.height)) / max_side)),
+      small_(std::max(1, cvRound(size.width / scale_)), std::max(1, cvRound(size.height / scale_))) {}
+
+cv::Mat1f Reduction::of(const cv::Mat1f& luminance) const {
+    if (small_ == luminance.size()) return luminance;
+    cv::Mat1f image;
+    cv::resize(luminance, image, small_, 0, 0, cv::INTER_AREA);
+    return image;
+}
+
 ReducedFrames reduce(const std::vector<cv::Mat3f>& frames, int max_side) {
+    const Reduction reduction(frames.front().size(), max_side);
     ReducedFrames reduced;
-    const cv::Size size = frames.front().size();
-    reduced.scale = std::max(1.0, static_cast<double>(std::max(size.width, size.height)) / max_side);
-    const cv::Size small(std::max(1, cvRound(size.width / reduced.scale)),
-                         std::max(1, cvRound(size.height / reduced.scale)));
-    for (const cv::Mat3f& frame : frames) {
-        cv::Mat1f image = mean_channel(frame);
-        if (small != size) cv::resize(image, image, small, 0, 0, cv::INTER_AREA);
-        reduced.images.push_back(image);
-    }
+    reduced.scale = reduction.scale();
+    for (const cv::Mat3f& frame : frames) reduced.images.push_back(reduction.of(mean_channel(frame)));
     return reduced;
 }
 

@@ -18,6 +18,18 @@ struct ReducedFrames {
 };
 ReducedFrames reduce(const std::vector<cv::Mat3f>& frames, int max_side);
 
+/// How frames of one size are reduced, one luminance picture at a time.
+class Reduction {
+public:
+    Reduction(cv::Size size, int max_side);
+    double scale() const { return scale_; }  ///< frame pixels per reduced pixel
+    cv::Mat1f of(const cv::Mat1f& luminance) const;
+
+private:
+    double scale_;
+    cv::Size small_;
+};
+
 /// Logarithm above a floor of a few standard deviations of the noise: a dark ball before a dark wall shows as clearly
 /// as a bright one.
 cv::Mat1f compress(const cv::Mat1f& radiance);

@@ -20,15 +20,20 @@ constexpr std::size_t least_rows = 16;               // decoders work on that ma
 int rows_of_a_band(const PhotoSource& photos, const PhotometricStereoOptions& options) {
     const cv::Size size = photos.size();
     if (options.band_rows > 0) return std::min(options.band_rows, std::max(size.height, 1));
+    return rows_within(photos, static_cast<std::size_t>(size.area()) * SolvedMaps::bytes_per_pixel(),
+                       options.memory_mib);
+}
+
+int rows_within(const PhotoSource& photos, std::size_t held, int memory_mib) {
+    const cv::Size size = photos.size();
     const std::size_t row = photos.bytes_per_row();
-    const std::size_t held =
-        static_cast<std::size_t>(size.area()) * SolvedMaps::bytes_per_pixel() + photos.bytes_held();
-    const std::size_t budget = static_cast<std::size_t>(options.memory_mib) * mebibyte;
+    held += photos.bytes_held();
+    const std::size_t budget = static_cast<std::size_t>(memory_mib) * mebibyte;
     if (held + bands_in_memory * row > budget)
-        throw InputError(fmt::format("memory_mib is {}, but {} photographs of {}x{} pixels need {}", options.memory_mib,
-                                     photos.count(), size.width, size.height,
-                                     (held + bands_in_memory * least_rows * row) / mebibyte + 1),
-                         "allow more memory with --memory-mib, or scale the photographs down");
+        throw InputError(
+            fmt::format("memory_mib is {}, but {} photographs of {}x{} pixels need {}", memory_mib, photos.count(),
+                        size.width, size.height, (held + bands_in_memory * least_rows * row) / mebibyte + 1),
+            "allow more memory with --memory-mib, or scale the photographs down");
     if (row == 0) return std::max(size.height, 1);
     const std::size_t fit = (budget - held) / (bands_in_memory * row);
     const std::size_t wanted = std::max(largest_band / row, least_rows);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+
 #include "processing/maps/photo_source.h"
 #include "processing/normals/photometric_stereo.h"
 
@@ -9,5 +11,8 @@ namespace darkbox {
 /// more than keep the processor's caches and both threads busy. Throws InputError that names memory_mib and what is
 /// needed when not even two rows fit.
 int rows_of_a_band(const PhotoSource& photos, const PhotometricStereoOptions& options);
+
+/// The same for other work that holds `held` bytes beside the bands and what the source holds.
+int rows_within(const PhotoSource& photos, std::size_t held, int memory_mib);
 
 }  // namespace darkbox

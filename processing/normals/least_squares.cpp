@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "processing/maps/photo_pixel.h"
 #include "processing/normals/least_squares_block.h"
 
 namespace darkbox {

@@ -347,20 +347,5 @@ void finish(float min_albedo, const LeastSquaresBlock& block, const BlockResults
     HWY_DYNAMIC_DISPATCH(finish)(min_albedo, block, results);
 }
 
-bool clipped_at(const PhotoRows& rows, int row, int column) {
-    if (!rows.clipped.empty()) return rows.clipped(row, column) != 0;
-    const auto at_limit = [&]<class Sample>(const Sample* rgb) {
-        return static_cast<float>(std::max({rgb[0], rgb[1], rgb[2]})) >= rows.limit;
-    };
-    switch (rows.samples.depth()) {
-        case CV_8U:
-            return at_limit(rows.samples.ptr<std::uint8_t>(row, column));
-        case CV_16U:
-            return at_limit(rows.samples.ptr<std::uint16_t>(row, column));
-        default:
-            return at_limit(rows.samples.ptr<float>(row, column));
-    }
-}
-
 }  // namespace darkbox
 #endif

@@ -72,7 +72,4 @@ void accumulate_albedo(const LightSet& set, LeastSquaresBlock& block);
 /// Results of usable pixels that are not too dark; zeros for the others.
 void finish(float min_albedo, const LeastSquaresBlock& block, const BlockResults& results);
 
-/// Is this pixel of one photograph clipped?
-bool clipped_at(const PhotoRows& rows, int row, int column);
-
 }  // namespace darkbox

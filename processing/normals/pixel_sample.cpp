@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "processing/maps/photo_pixel.h"
 #include "processing/normals/least_squares_block.h"
 
 namespace darkbox {

@@ -28,15 +28,45 @@ constexpr double least_determinant = 1e-3;    ///< of the directions of a pixel'
 /// One channel's samples, a column for each pixel; NaN where clipped or not a number.
 using Samples = Eigen::MatrixXd;
 
+/// Directions of the used lights, a row each; a near light's is shortened by its fall-off.
+using Directions = Eigen::Matrix<double, Eigen::Dynamic, 3>;
+
 struct UsedLights {
     std::vector<std::size_t> image;
-    Eigen::Matrix<double, Eigen::Dynamic, 3> directions;
+    std::vector<Directions> directions;  ///< at each chosen pixel; one for all of them where all lights are distant
+
+    const Directions& at(Eigen::Index pixel) const {
+        return directions[directions.size() == 1 ? 0 : static_cast<std::size_t>(pixel)];
+    }
 };
 
-UsedLights used_of(const Lights& lights) {
-    UsedLights used{{}, direction_matrix(lights)};
+Directions directions_at(const Lights& lights, const std::vector<std::size_t>& images, const Eigen::Vector3d& point) {
+    Directions rows(static_cast<Eigen::Index>(images.size()), 3);
+    for (std::size_t j = 0; j < images.size(); ++j) {
+        const Incidence there = incidence(lights[images[j]], point);
+        rows.row(static_cast<Eigen::Index>(j)) = there.falloff * there.direction.transpose();
+    }
+    return rows;
+}
+
+UsedLights used_of(const Lights& lights, const std::vector<cv::Point>& pixels, const SemiCalibratedOptions& options) {
+    UsedLights used;
+    bool near = false;
     for (std::size_t i = 0; i < lights.size(); ++i)
-        if (lights[i].used) used.image.push_back(i);
+        if (lights[i].used) {
+            used.image.push_back(i);
+            near = near || lights[i].near;
+        }
+    if (!near) {
+        used.directions.push_back(direction_matrix(lights));
+        return used;
+    }
+    if (!options.geometry.view)
+        throw InputError("the lights are near, but where the pixels lie is not known",
+                         "give the view: millimetres per pixel at the object");
+    for (const cv::Point& pixel : pixels)
+        used.directions.push_back(
+            directions_at(lights, used.image, options.geometry.point_at(pixel.y * options.row_step, pixel.x)));
     return used;
 }
 
@@ -117,14 +147,13 @@ Unexplained unexplained(const Samples& even, const UsedLights& used, double trim
     for (Eigen::Index pixel = 0; pixel < even.cols(); ++pixel) {
         const std::vector<Eigen::Index> kept = kept_samples(even, pixel, trim);
         if (kept.empty()) continue;
-        const Eigen::Matrix<double, Eigen::Dynamic, 3> directions = used.directions(kept, Eigen::all);
+        const Directions directions = used.at(pixel)(kept, Eigen::all);
         const Eigen::VectorXd samples = even(kept, pixel);
         const Eigen::Matrix3d moments = directions.transpose() * directions;
         const auto count = static_cast<double>(kept.size());
         if (moments.determinant() < least_determinant * count * count * count / 27) continue;
         // With moments = C C^T, the rows of directions C^-T are orthonormal columns.
-        const Eigen::Matrix<double, Eigen::Dynamic, 3> basis =
-            moments.llt().matrixL().solve(directions.transpose()).transpose();
+        const Directions basis = moments.llt().matrixL().solve(directions.transpose()).transpose();
         for (std::size_t a = 0; a < kept.size(); ++a) {
             const auto row = static_cast<Eigen::Index>(a);
             diagonal[kept[a]] += samples[row] * samples[row];
@@ -234,16 +263,18 @@ void SemiCalibratedOptions::validate() const {
     if (most_pixels < 1) throw InputError(fmt::format("most_pixels is {}", most_pixels), "allowed: 1 or more");
     if (most_rounds < 1) throw InputError(fmt::format("most_rounds is {}", most_rounds), "allowed: 1 or more");
     if (!(precision > 0)) throw InputError(fmt::format("precision is {}", precision), "allowed: above 0");
+    if (row_step < 1) throw InputError(fmt::format("row_step is {}", row_step), "allowed: 1 or more");
 }
 
 SemiCalibratedResult estimate_intensities(const PhotoStack& stack, const Lights& lights,
                                           const SemiCalibratedOptions& options, const WorkContext& work) {
     options.validate();
     require_matching(stack, lights);
-    const UsedLights used = used_of(lights);
+    const auto count = static_cast<std::size_t>(direction_matrix(lights).rows());
     const std::size_t most =
-        std::clamp<std::size_t>(most_values / used.image.size(), 100, static_cast<std::size_t>(options.most_pixels));
+        std::clamp<std::size_t>(most_values / count, 100, static_cast<std::size_t>(options.most_pixels));
     const std::vector<cv::Point> pixels = chosen_pixels(stack.mask, most);
+    const UsedLights used = used_of(lights, pixels, options);
     std::array<Samples, 3> samples;
     for (int channel = 0; channel < 3; ++channel) {
         samples[static_cast<std::size_t>(channel)] = samples_of(stack, used, pixels, channel);

@@ -23,16 +23,17 @@ cv::Rect part_around(const Ball& ball, const cv::Size& size) {
 
 }  // namespace
 
-std::optional<double> ball_blur_px(const std::vector<cv::Mat3f>& frames, const std::vector<Ball>& balls) {
-    if (frames.empty() || balls.empty()) return std::nullopt;
-    const cv::Rect part = part_around(balls.front(), frames.front().size());
+std::optional<double> ball_blur_px(BallPhotographs& photographs, const std::vector<Ball>& balls) {
+    if (photographs.count() == 0 || balls.empty()) return std::nullopt;
+    const cv::Rect part = part_around(balls.front(), photographs.size());
     if (part.empty()) return std::nullopt;
+    const std::vector<cv::Mat3f> frames = photographs.parts({part}).front();
     cv::Mat1f mean(part.size(), 0.0F);
     cv::Mat1b good(part.size(), uchar{255});
     for (const cv::Mat3f& frame : frames) {
         for (int v = 0; v < part.height; ++v)
             for (int u = 0; u < part.width; ++u) {
-                const cv::Vec3f& pixel = frame(part.y + v, part.x + u);
+                const cv::Vec3f& pixel = frame(v, u);
                 mean(v, u) += (pixel[0] + pixel[1] + pixel[2]) / (3.0F * static_cast<float>(frames.size()));
                 if (pixel[0] > unclipped || pixel[1] > unclipped || pixel[2] > unclipped) good(v, u) = 0;
             }

@@ -36,14 +36,12 @@ cv::Point fixed_point(const cv::Point2d& p) {
 
 }  // namespace
 
-BallView view_of_balls(const std::vector<cv::Mat3f>& frames, const std::vector<Ball>& balls) {
-    const cv::Rect box = box_of(balls, frames.front().size());
-    cv::Mat3f most = frames.front()(box).clone();
-    for (const cv::Mat3f& frame : frames) most = cv::max(most, frame(box));
+BallView view_of_balls(const cv::Mat3f& brightest, const std::vector<Ball>& balls) {
+    const cv::Rect box = box_of(balls, brightest.size());
     BallView view;
     view.scale = std::clamp(std::floor(wanted_side / std::max(box.width, box.height)), 1.0, 16.0);
     view.origin = {static_cast<double>(box.x), static_cast<double>(box.y)};
-    cv::resize(viewable(most), view.image, {}, view.scale, view.scale, cv::INTER_NEAREST);
+    cv::resize(viewable(brightest(box).clone()), view.image, {}, view.scale, view.scale, cv::INTER_NEAREST);
     return view;
 }
 

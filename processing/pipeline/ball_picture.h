@@ -17,8 +17,9 @@ struct BallView {
     }
 };
 
-/// Cut out with a margin and magnified so that small balls can be judged.
-BallView view_of_balls(const std::vector<cv::Mat3f>& frames, const std::vector<Ball>& balls);
+/// Cut out with a margin and magnified so that small balls can be judged. `brightest`: each channel's greatest value
+/// over the frames.
+BallView view_of_balls(const cv::Mat3f& brightest, const std::vector<Ball>& balls);
 
 /// Outline and highlights drawn: calibration/ball.png.
 cv::Mat3b draw_balls(const BallView& view, const Calibration& calibration);

@@ -17,6 +17,7 @@
 #include "processing/pipeline/ball_picture.h"
 #include "processing/pipeline/given_lights.h"
 #include "processing/pipeline/intensities.h"
+#include "processing/pipeline/session_ball.h"
 #include "processing/pipeline/session_files.h"
 #include "processing/pipeline/session_geometry.h"
 #include "processing/pipeline/stack.h"
@@ -185,20 +186,21 @@ void leave_out(Calibration& calibration, const std::vector<std::string>& dropped
 }
 
 /// None where nothing stands out from the background: the picture's centre serves then.
-std::optional<cv::Point2d> centroid_without_balls(const Session& session, const BallFrames& ball,
+std::optional<cv::Point2d> centroid_without_balls(const Session& session, const SessionBall& ball,
                                                   const Calibration& calibration, const WorkContext& work) {
     try {
-        if (ball.separate) return centroid_of(load_mask(session, work));
+        if (ball.separate()) return centroid_of(load_mask(session, work));
         std::vector<cv::Vec3d> discs;
         for (const Ball& b : calibration.balls) discs.emplace_back(b.x, b.y, b.radius);
-        return centroid_of(automatic_mask(ball.frames, discs));
+        return centroid_of(mask_of_brightest(ball.brightest_luminance(), discs));
     } catch (const InputError&) {
         return std::nullopt;
     }
 }
 
 /// Directions of near lamps hold at the object: where no mask says where that is, the photographs do, less the balls.
-void hold_at_object(const Session& session, const BallFrames& ball, Calibration& calibration, const WorkContext& work) {
+void hold_at_object(const Session& session, const SessionBall& ball, Calibration& calibration,
+                    const WorkContext& work) {
     const bool near =
         std::any_of(calibration.lights.begin(), calibration.lights.end(), [](const Light& l) { return l.near; });
     if (!near || !calibration.view) return;
@@ -243,19 +245,19 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
         require_effect(options, "came with the photographs");
         summary.calibration = from_given(*given);
     } else {
-        const BallFrames ball = load_ball_frames(session, work);
-        summary.seconds.read = watch.lap();
-        step(work, {"calibrating lights", 0, 1, "ball and highlights"});
-        CalibrationOptions wanted = with_geometry(session, with_imported(session, options), ball.frames.front().size());
+        SessionBall ball(session, work);
+        CalibrationOptions wanted = with_geometry(session, with_imported(session, options), ball.size());
         if (options.photometric) wanted.object_pixels = pixels_of_object(session, work);
-        summary.calibration = calibrate(ball.frames, ball.files, wanted);
+        step(work, {"calibrating lights", 0, 1, "ball and highlights"});
+        summary.calibration = calibrate(ball, ball.files(), wanted);
         require_highlights(session, summary.calibration, options.calibration.drop);
         if (!wanted.object) hold_at_object(session, ball, summary.calibration, work);
         append(summary.calibration.warnings, unused_geometry(session, wanted));
-        summary.blur_px = ball_blur_px(ball.frames, summary.calibration.balls);
-        summary.seconds.solve = watch.lap();
-        const BallView view = view_of_balls(ball.frames, summary.calibration.balls);
+        summary.seconds.read = ball.seconds();
+        summary.seconds.solve = std::max(0.0, watch.lap() - ball.seconds());
+        const BallView view = view_of_balls(ball.brightest(), summary.calibration.balls);
         write_png(files.ball_picture, draw_balls(view, summary.calibration));
+        summary.blur_px = ball_blur_px(ball, summary.calibration.balls);
     }
     if (options.from || given) leave_out(summary.calibration, options.calibration.drop);
     summary.calibration = with_measured_intensities(session, std::move(summary.calibration), card_of(options), work);

@@ -13,6 +13,7 @@
 #include "processing/formats/map_files.h"
 #include "processing/normals/solver_names.h"
 #include "processing/pipeline/ideal_sphere.h"
+#include "processing/pipeline/radiance.h"
 #include "processing/pipeline/session_files.h"
 #include "processing/pipeline/session_geometry.h"
 #include "processing/pipeline/solved.h"
@@ -111,10 +112,9 @@ public:
         return solved;
     }
 
-    NormalMap normals() {
-        const bool stored = !options_.solver && options_.drop.empty() && fs::exists(files_.normals);
-        return stored ? read_normal_map(files_.normals) : solve(solver_).normals;
-    }
+    bool normals_stored() const { return !options_.solver && options_.drop.empty() && fs::exists(files_.normals); }
+
+    NormalMap normals() { return normals_stored() ? read_normal_map(files_.normals) : solve(solver_).normals; }
 
 private:
     const Session& session_;
@@ -127,6 +127,27 @@ private:
     SceneGeometry geometry_;
     std::optional<PhotoStack> stack_;
 };
+
+/// Whether anything asked for needs more than what the session's results say.
+bool needs_photographs(const Bench& bench, const EvaluateOptions& options) {
+    return options.held_out || options.truth == NormalTruth::ideal_sphere || !options.compare.empty() ||
+           !bench.normals_stored();
+}
+
+/// All photographs are held, since each is predicted from all others: better said before than found out by the kernel.
+void require_memory(const Session& session, int memory_mib) {
+    constexpr std::size_t radiance = sizeof(cv::Vec3f) + 1;
+    constexpr std::size_t fits =
+        350;  // bytes a pixel: three solved sets of maps, a scene and its shading, a prediction
+    const std::vector<FrameRecord> photographs = require_lit(session);
+    const cv::Size size = FrameBands(session, {photographs.front()}).size();
+    const std::size_t need =
+        ((static_cast<std::size_t>(size.area()) * (photographs.size() * radiance + fits)) >> 20) + 1;
+    if (need > static_cast<std::size_t>(memory_mib))
+        throw InputError(fmt::format("memory_mib is {}, but evaluating {} photographs of {}x{} pixels needs {}",
+                                     memory_mib, photographs.size(), size.width, size.height, need),
+                         "allow more memory with --memory-mib, or import the photographs scaled down");
+}
 
 /// Throws where it was asked for and is not to be had.
 std::optional<NormalMap> truth_of_normals(const Session& session, const EvaluateOptions& options, Bench& bench,
@@ -186,6 +207,7 @@ void leave_lights_out(Bench& bench, const WorkContext& work, Evaluation& evaluat
 
 void EvaluateOptions::validate() const {
     bootstrap.validate();
+    if (memory_mib < 1) throw InputError(fmt::format("memory_mib is {}", memory_mib), "allowed: 1 or more");
     if (!compare.empty() && compare.size() != 2)
         throw InputError(fmt::format("compare names {} solvers", compare.size()), "allowed: none, or two");
 }
@@ -193,6 +215,7 @@ void EvaluateOptions::validate() const {
 Evaluation evaluate_session(const Session& session, const EvaluateOptions& options, const WorkContext& work) {
     options.validate();
     Bench bench(session, options, work);
+    if (needs_photographs(bench, options)) require_memory(session, options.memory_mib);
     Evaluation evaluation;
     evaluation.solver = bench.solver();
     if (const auto truth = truth_of_normals(session, options, bench, evaluation)) {

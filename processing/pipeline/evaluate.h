@@ -28,6 +28,7 @@ struct EvaluateOptions {
     PairedBootstrapOptions bootstrap;
     std::optional<std::filesystem::path> reference_lights;  ///< the lights' truth, in the frames' order
     bool held_out = true;                                   ///< leave one light out
+    int memory_mib = 4096;  ///< for all photographs at once and what is solved from them
 
     /// Throws InputError that names the field and the allowed range.
     void validate() const;

@@ -101,12 +101,15 @@ std::vector<Inspected> inspect_all(const std::vector<fs::path>& files, FrameKind
     return all;
 }
 
-void require_frame_for_frame(const Survey& ball, std::size_t lit, const ImportOptions& options) {
-    if (options.ball_images && ball.frames.size() != lit)
-        throw InputError(fmt::format("there are {} photographs of the ball in {} but {} of the object",
-                                     ball.frames.size(), options.ball_images->string(), lit),
-                         "photograph the ball under the same lamps in the same order: frame i of one is lit as frame i "
-                         "of the other");
+/// Frame i of a folder that goes beside the object's is lit as frame i of the object.
+void require_frame_for_frame(const Survey& beside, std::size_t lit, const std::optional<fs::path>& folder,
+                             const char* thing) {
+    if (folder && beside.frames.size() != lit)
+        throw InputError(fmt::format("there are {} photographs of the {} in {} but {} of the object",
+                                     beside.frames.size(), thing, folder->string(), lit),
+                         fmt::format("photograph the {} under the same lamps in the same order: frame i of one is lit "
+                                     "as frame i of the other",
+                                     thing));
 }
 
 /// The mask asked for, else the one that lies beside the photographs.
@@ -160,11 +163,33 @@ Extra balls_extra(const std::vector<Ball>& balls) {
     return {given_ball, {bytes.begin(), bytes.end()}};
 }
 
-/// What was found in the folders of the object and of the ball.
+/// What was found in the folders of the object, of the ball and of the diffuse plane.
 struct Findings {
-    Survey object, ball;
-    std::vector<Inspected> lit, ball_frames;
+    Survey object, ball, flat;
+    std::vector<Inspected> lit, ball_frames, flat_frames;
+
+    std::vector<Inspected> all_frames() const {
+        std::vector<Inspected> all = lit;
+        all.insert(all.end(), ball_frames.begin(), ball_frames.end());
+        all.insert(all.end(), flat_frames.begin(), flat_frames.end());
+        return all;
+    }
 };
+
+/// Reads every photograph of every folder once.
+Findings find_photographs(const ImportOptions& options, const WorkContext& work) {
+    Findings found;
+    found.object = survey_folders(options.folders, options.layout);
+    if (options.ball_images) found.ball = survey_folders({*options.ball_images}, ImportLayout::plain);
+    if (options.flat_images) found.flat = survey_folders({*options.flat_images}, ImportLayout::plain);
+    require_frame_for_frame(found.ball, found.object.frames.size(), options.ball_images, "ball");
+    require_frame_for_frame(found.flat, found.object.frames.size(), options.flat_images, "flat field");
+    found.lit = inspect_all(found.object.frames, FrameKind::lit, "frames/", options, work);
+    found.ball_frames = inspect_all(found.ball.frames, FrameKind::ball, "frames/ball/", options, work);
+    found.flat_frames = inspect_all(found.flat.frames, FrameKind::flat, "frames/flat/", options, work);
+    if (!found.flat_frames.empty()) require_one_size(found.lit.front(), found.flat_frames.front());
+    return found;
+}
 
 /// A circle given by hand outranks a mask that merely lies there.
 std::optional<fs::path> ball_mask_of(const Findings& found, const ImportOptions& options) {
@@ -247,15 +272,9 @@ void ImportOptions::validate() const {
 
 Session import_photographs(const ImportOptions& options, const WorkContext& work) {
     options.validate();
-    Findings found;
-    found.object = survey_folders(options.folders, options.layout);
-    if (options.ball_images) found.ball = survey_folders({*options.ball_images}, ImportLayout::plain);
-    require_frame_for_frame(found.ball, found.object.frames.size(), options);
-    found.lit = inspect_all(found.object.frames, FrameKind::lit, "frames/", options, work);
-    found.ball_frames = inspect_all(found.ball.frames, FrameKind::ball, "frames/ball/", options, work);
+    const Findings found = find_photographs(options, work);
     const std::vector<Extra> extras = extras_of(found, options);
-    std::vector<Inspected> all = found.lit;
-    all.insert(all.end(), found.ball_frames.begin(), found.ball_frames.end());
+    const std::vector<Inspected> all = found.all_frames();
 
     SessionInfo info;
     info.object = options.object.empty() ? name_of_folder(options.folders.front()) : options.object;

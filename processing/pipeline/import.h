@@ -27,6 +27,7 @@ struct ImportOptions {
     std::vector<std::filesystem::path> folders;        ///< one object's photographs, in the order given
     std::filesystem::path out;                         ///< the session's folder, absent or empty
     std::optional<std::filesystem::path> ball_images;  ///< a ball in the object's place under the same lamps
+    std::optional<std::filesystem::path> flat_images;  ///< a diffuse plane there: tells the lamps' intensities
     std::vector<Ball> balls;                           ///< pixels
     std::optional<double> ball_diameter_mm;            ///< of every ball; tells the scale
     std::optional<std::filesystem::path> ball_mask;    ///< 255 on the ball
@@ -45,7 +46,7 @@ struct ImportOptions {
 /// choice of transfer curve is recorded per frame and in the notes, with warnings in words (SessionInfo::notes that
 /// begin with "warning: "). Names are ordered naturally; a picture whose name begins or ends with the word "mask" is a
 /// mask, of the object or, beside the ball's photographs, of the ball. Throws InputError: a file that cannot be read,
-/// two sizes (both files are named), a ball capture or lights of another count.
+/// two sizes (both files are named), photographs of the ball or the plane, or lights, of another count.
 Session import_photographs(const ImportOptions& options, const WorkContext& work = {});
 
 }  // namespace darkbox

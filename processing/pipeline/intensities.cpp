@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "acquisition/frame/error.h"
+#include "processing/calibration/card_intensity.h"
 #include "processing/calibration/lamp_checks.h"
 #include "processing/normals/semi_calibrated.h"
 #include "processing/pipeline/radiance.h"
@@ -22,20 +23,6 @@ std::size_t used_lights(const Lights& lights) {
         std::count_if(lights.begin(), lights.end(), [](const Light& light) { return light.used; }));
 }
 
-struct PlaneFrames {
-    std::vector<cv::Mat3f> frames;
-    std::vector<cv::Mat1b> clipped;
-};
-
-PlaneFrames read_plane(const Session& session, FrameKind kind, const WorkContext& work) {
-    PlaneFrames plane;
-    for (Radiance& radiance : read_radiances(session, photographs_of(session, kind), work)) {
-        plane.frames.push_back(std::move(radiance.image));
-        plane.clipped.push_back(std::move(radiance.clipped));
-    }
-    return plane;
-}
-
 /// The middle of the picture, where a flat field shows its plane.
 GreyCard middle_of(cv::Size size) {
     GreyCard card;
@@ -43,15 +30,17 @@ GreyCard middle_of(cv::Size size) {
     return card;
 }
 
-SemiCalibratedResult estimated_from(const PhotoStack& stack, Lights lights, const WorkContext& work) {
+SemiCalibratedResult estimated_from(const PhotoStack& stack, Lights lights, const SemiCalibratedOptions& options,
+                                    const WorkContext& work) {
     for (Light& light : lights) light.intensity.setOnes();
-    return estimate_intensities(stack, lights, {}, work);
+    return estimate_intensities(stack, lights, options, work);
 }
 
 /// None where the photographs leave intensities open: nobody asked for them.
-std::optional<SemiCalibratedResult> tried_on(const PhotoStack& stack, const Lights& lights, const WorkContext& work) {
+std::optional<SemiCalibratedResult> tried_on(const PhotoStack& stack, const Lights& lights,
+                                             const SemiCalibratedOptions& options, const WorkContext& work) {
     try {
-        return estimated_from(stack, lights, work);
+        return estimated_from(stack, lights, options, work);
     } catch (const InputError&) {
         return std::nullopt;
     }
@@ -78,27 +67,38 @@ Calibration with_measured_intensities(const Session& session, Calibration calibr
                                       const std::optional<GreyCard>& card, const WorkContext& work) {
     const bool flats = photographs_of(session, FrameKind::flat).size() == calibration.lights.size();
     if (!card && (!flats || calibration.intensity_origin != IntensityOrigin::unknown)) return calibration;
-    const PlaneFrames plane = read_plane(session, card ? FrameKind::lit : FrameKind::flat, work);
-    GreyCard area = card ? *card : middle_of(plane.frames.front().size());
-    area.view = calibration.view;
-    calibration.lights = with_intensities_of_card(plane.frames, plane.clipped, std::move(calibration.lights), area);
+    const std::vector<FrameRecord> frames = photographs_of(session, card ? FrameKind::lit : FrameKind::flat);
+    if (frames.size() != calibration.lights.size())
+        throw InputError(
+            fmt::format("{} frames of the grey card for {} lights", frames.size(), calibration.lights.size()),
+            "give one frame for each light");
+    for_radiances(session, frames, work, [&](std::size_t i, const Radiance& frame) {
+        Light& light = calibration.lights[i];
+        GreyCard area = card ? *card : middle_of(frame.image.size());
+        area.view = calibration.view;
+        if (light.used) light.intensity = intensity_on_card(frame.image, frame.clipped, light, area);
+    });
+    calibration.lights = with_mean_intensity_one(std::move(calibration.lights));
     calibration.intensity_origin = card ? IntensityOrigin::grey_card : IntensityOrigin::flat;
     for (std::string& words : weak_lamps(calibration.lights)) calibration.warnings.push_back(std::move(words));
     return calibration;
 }
 
 ChosenIntensities choose_intensities(const PhotoStack& stack, Calibration calibration, IntensityChoice choice,
-                                     const WorkContext& work) {
+                                     const SceneGeometry& geometry, int row_step, const WorkContext& work) {
     const bool known = calibration.intensity_origin != IntensityOrigin::unknown;
     const bool few = used_lights(calibration.lights) < fewest_for_automatic;
     if (choice == IntensityChoice::given || (choice == IntensityChoice::automatic && (known || few)))
         return {std::move(calibration), false, {}};
     step(work, {"estimating intensities", 0, 1, ""});
+    SemiCalibratedOptions options;
+    options.geometry = geometry;
+    options.row_step = row_step;
     if (choice == IntensityChoice::estimate) {
-        SemiCalibratedResult result = estimated_from(stack, calibration.lights, work);
+        SemiCalibratedResult result = estimated_from(stack, calibration.lights, options, work);
         return adopted(std::move(calibration), std::move(result));
     }
-    auto result = tried_on(stack, calibration.lights, work);
+    auto result = tried_on(stack, calibration.lights, options, work);
     if (!result || !(result->residual < clear_gain * result->residual_equal))
         return {std::move(calibration), false, {}};
     return adopted(std::move(calibration), std::move(*result));

@@ -9,6 +9,7 @@
 #include "processing/calibration/calibration.h"
 #include "processing/calibration/intensity.h"
 #include "processing/maps/maps.h"
+#include "processing/maps/view.h"
 
 namespace darkbox {
 
@@ -28,9 +29,10 @@ struct ChosenIntensities {
     bool changed = false;     ///< they were estimated: calibration/lights.json is to hold them from now on
     std::vector<std::string> warnings;
 };
-/// Estimates intensities from the object's photographs where `choice` says so. Measurements behind the automatic
-/// choice: docs/decisions/0013.
+/// Estimates intensities from the object's photographs where `choice` says so. `stack` holds every `row_step`-th row of
+/// the picture; `geometry` tells where pixels lie, for near lights. Measurements behind the automatic choice:
+/// docs/decisions/0013.
 ChosenIntensities choose_intensities(const PhotoStack& stack, Calibration calibration, IntensityChoice choice,
-                                     const WorkContext& work);
+                                     const SceneGeometry& geometry, int row_step, const WorkContext& work);
 
 }  // namespace darkbox

@@ -83,6 +83,8 @@ double LightsFit::excess() const {
 
 std::optional<LightsFit> lights_fit(const PhotoStack& stack, const Lights& lights) {
     const std::vector<std::size_t> used = used_images(lights);
+    if (std::any_of(used.begin(), used.end(), [&](std::size_t image) { return lights[image].near.has_value(); }))
+        return std::nullopt;  // their directions change over the picture: no three images explain all pixels
     const auto directions = direction_matrix(lights);
     if (directions.rows() < fewest_lights) return std::nullopt;
     const std::vector<cv::Point> pixels = unclipped_pixels(stack, used);

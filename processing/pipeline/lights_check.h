@@ -19,7 +19,8 @@ struct LightsFit {
     double excess() const;
 };
 
-/// Over pixels of the mask that no used light clips; none where these or the lights are too few to tell. Each light's
+/// Over pixels of the mask that no used light clips; none where these or the lights are too few to tell, or a used
+/// light is near. Each light's
 /// samples are divided by its intensity. Deterministic.
 std::optional<LightsFit> lights_fit(const PhotoStack& stack, const Lights& lights);
 

@@ -4,7 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <initializer_list>
 #include <iterator>
+#include <memory>
+#include <opencv2/imgproc.hpp>
 
 #include "acquisition/frame/error.h"
 #include "processing/formats/calibration_file.h"
@@ -15,6 +19,7 @@
 #include "processing/maps/parallel.h"
 #include "processing/maps/srgb.h"
 #include "processing/normals/integrate.h"
+#include "processing/normals/integration_memory.h"
 #include "processing/normals/solver_names.h"
 #include "processing/pipeline/angular_error.h"
 #include "processing/pipeline/frame_tally.h"
@@ -61,6 +66,25 @@ HeightFacts facts_of(const HeightMap& map, const MeshCounts& mesh) {
     return facts;
 }
 
+/// `box`: where the object is. Beside normals and albedo, and the height map itself.
+void require_memory_for_height(const cv::Rect& box, cv::Size picture, int memory_mib, const char* remedy) {
+    constexpr std::size_t maps = 2 * (sizeof(cv::Vec3f) + 1) + sizeof(float) + 2;
+    const std::size_t need = static_cast<std::size_t>(picture.area()) * maps + integration_bytes(box.size());
+    if (need > static_cast<std::size_t>(memory_mib) << 20)
+        throw InputError(fmt::format("memory_mib is {}, but the height of an object of {}x{} pixels needs {}",
+                                     memory_mib, box.width, box.height, (need >> 20) + 1),
+                         remedy);
+}
+
+constexpr const char* without_surface = "allow more memory with --memory-mib, or leave the surface out: --no-surface";
+constexpr const char* near_needs_height =
+    "allow more memory with --memory-mib: near lamps need to know where the surface lies";
+
+void release_confidence(PhotometricStereoResult& solved) {
+    for (cv::Mat* map : std::initializer_list<cv::Mat*>{&solved.residual, &solved.lights_used, &solved.sigma_deg})
+        map->release();
+}
+
 HeightFacts write_surface(const ResultFiles& files, const PhotometricStereoResult& solved,
                           const std::optional<ViewGeometry>& view, const WorkContext& work) {
     step(work, {"integrating height", 0, 1, ""});
@@ -70,14 +94,17 @@ HeightFacts write_surface(const ResultFiles& files, const PhotometricStereoResul
 }
 
 /// Near lights and near cameras need to know where each pixel lies: first in the plane z = 0, then on the surface that
-/// the last normals gave.
+/// the last normals gave, which is left in `options`.
 PhotometricStereoResult solve_normals(SessionPhotos& photos, const Calibration& calibration,
-                                      PhotometricStereoOptions options, const WorkContext& work) {
+                                      PhotometricStereoOptions& options, const WorkContext& work) {
     options.geometry.view = calibration.view;
     PhotometricStereoResult solved = photometric_stereo(photos, calibration.lights, options, work);
     const bool near = std::any_of(calibration.lights.begin(), calibration.lights.end(),
                                   [](const Light& light) { return light.used && light.near; });
     for (int pass = 0; near && pass < near_light_passes; ++pass) {
+        require_memory_for_height(cv::boundingRect(solved.normals.valid), photos.size(), options.memory_mib,
+                                  near_needs_height);
+        release_confidence(solved);
         options.geometry.height_mm = integrate_normals({solved.normals, calibration.view}, {}, work).height;
         photos.rewind();
         solved = photometric_stereo(photos, calibration.lights, options, work);
@@ -141,7 +168,8 @@ SolvedSession solve_session(SessionPhotos& photos, const fs::path& calibration_f
     StoredCalibration stored = read_calibration(calibration_file);
     require_solvable(stored.calibration.lights);
     SolvedSession solved;
-    solved.stereo = solve_normals(photos, stored.calibration, options.stereo, work);
+    PhotometricStereoOptions stereo = options.stereo;
+    solved.stereo = solve_normals(photos, stored.calibration, stereo, work);
     solved.solve_seconds = solved.stereo.seconds;
     const PhotoStack kept = photos.kept_stack();
     require_any_normal(solved.stereo, kept);
@@ -150,14 +178,16 @@ SolvedSession solve_session(SessionPhotos& photos, const fs::path& calibration_f
     solved.warnings = leave_out_black(tally, kept, stored.calibration.lights);
     const bool fewer = !solved.warnings.empty();
     Stopwatch watch;
-    ChosenIntensities chosen = choose_intensities(kept, std::move(stored.calibration), options.intensities, work);
+    ChosenIntensities chosen = choose_intensities(kept, std::move(stored.calibration), options.intensities,
+                                                  stereo.geometry, photos.kept_row_step(), work);
     solved.intensity_seconds = watch.lap();
     solved.calibration = std::move(chosen.calibration);
     append(solved.warnings, std::move(chosen.warnings));
     if (chosen.changed || fewer) {
         write_calibration(calibration_file, solved.calibration, stored.rig);
         photos.rewind();
-        solved.stereo = solve_normals(photos, solved.calibration, options.stereo, work);
+        stereo = options.stereo;
+        solved.stereo = solve_normals(photos, solved.calibration, stereo, work);
         solved.solve_seconds += solved.stereo.seconds;
     }
     append(solved.warnings, tally.warnings(solved.calibration.lights));
@@ -202,15 +232,24 @@ NormalsSummary run_normals(const Session& session, const NormalsOptions& options
     const ResultFiles files(session.folder());
     require_made(files.calibration, session, "calibrate");
     Stopwatch watch;
-    SessionPhotos photos(session);
-    const SolvedSession solved = solve_session(photos, files.calibration, options, work);
-    NormalsSummary summary = summary_of(session, solved, options, photos.size());
+    auto photos = std::make_unique<SessionPhotos>(session);
+    const cv::Size size = photos->size();
+    const auto require_height = [&](const cv::Mat1b& object) {
+        if (options.surface)
+            require_memory_for_height(cv::boundingRect(object), size, options.stereo.memory_mib, without_surface);
+    };
+    if (extra_of(session, object_mask)) require_height(photos->mask());  // before any work is done in vain
+    SolvedSession solved = solve_session(*photos, files.calibration, options, work);
+    require_height(solved.stereo.normals.valid);
+    NormalsSummary summary = summary_of(session, solved, options, size);
     summary.seconds.read = std::max(0.0, watch.lap() - solved.solve_seconds - solved.intensity_seconds);
-    if (auto warning = contradiction(session, photos, summary.lights, work))
+    if (auto warning = contradiction(session, *photos, summary.lights, work))
         summary.warnings.push_back(std::move(*warning));
+    photos.reset();
     watch.lap();
     summary.removed = remove_derived(session, {"texels", "shading"});
     write_maps(files, solved.stereo, work);
+    release_confidence(solved.stereo);
     for (const auto& stale : {files.height, files.surface}) std::filesystem::remove(stale);
     if (options.surface) summary.height = write_surface(files, solved.stereo, solved.calibration.view, work);
     summary.seconds.write = watch.lap();

@@ -1,3 +1,4 @@
+#include "processing/pipeline/shade_stage.h"
 #include "processing/pipeline/stages.h"
 
 namespace darkbox {
@@ -11,7 +12,9 @@ ProcessSummary run_process(const Session& session, const ProcessOptions& options
     summary.calibrate = run_calibrate(session, options.calibrate, work);
     summary.normals = run_normals(session, options.normals, work);
     summary.texels = run_texels(session, options.texels, work);
-    summary.shade = run_shade(session, options.shading, work);
+    ShadingBands bands;
+    bands.memory_mib = options.normals.stereo.memory_mib;
+    summary.shade = run_shade(session, options.shading, bands, work);
     summary.report = run_report(session, work);
     return summary;
 }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <cmath>
@@ -21,8 +22,15 @@
 namespace darkbox {
 namespace {
 
-constexpr int rows_at_once = 64;
-constexpr std::size_t libraries_files = 64;  // what else may be open
+constexpr int most_rows = 64, least_rows = 16;  // of a band; decoders work on sixteen at once
+constexpr std::size_t largest_band = 32UL << 20;
+constexpr std::size_t whole_pictures = 512UL << 20;  // bytes
+constexpr std::size_t libraries_files = 64;          // what else may be open
+
+int rows_of_band(std::size_t bytes_per_row, int height) {
+    const std::size_t fit = largest_band / std::max<std::size_t>(bytes_per_row, 1);
+    return std::min(height, std::clamp(static_cast<int>(std::min<std::size_t>(fit, most_rows)), least_rows, most_rows));
+}
 
 }  // namespace
 
@@ -161,8 +169,12 @@ private:
 
 FrameBands::FrameBands(const Session& session, const std::vector<FrameRecord>& photographs) {
     allow_open_files(photographs.size() + libraries_files);
+    std::vector<FrameRecord> served;
+    for (const FrameRecord& photograph : photographs)
+        if (is_captured(photograph))
+            for (const FrameRecord& frame : frames_of_photograph(session, photograph)) served.push_back(frame);
     for (const FrameRecord& photograph : photographs) {
-        photos_.push_back(open(session, photograph));
+        photos_.push_back(open(session, photograph, served));
         const cv::Size size = photos_.back()->size();
         if (photos_.size() == 1) size_ = size;
         if (size != size_)
@@ -174,18 +186,22 @@ FrameBands::FrameBands(const Session& session, const std::vector<FrameRecord>& p
 
 FrameBands::~FrameBands() = default;
 
-std::unique_ptr<PhotoReader> FrameBands::open(const Session& session, const FrameRecord& photograph) {
+std::unique_ptr<PhotoReader> FrameBands::open(const Session& session, const FrameRecord& photograph,
+                                              const std::vector<FrameRecord>& served) {
     if (!is_captured(photograph)) return std::make_unique<PlainPhoto>(session, photograph, nullptr);
     const std::vector<FrameRecord> frames = frames_of_photograph(session, photograph);
-    if (frames.size() == 1) return std::make_unique<PlainPhoto>(session, photograph, unlit_for(session, photograph));
+    if (frames.size() == 1)
+        return std::make_unique<PlainPhoto>(session, photograph, unlit_for(session, photograph, served));
     std::vector<const UnlitFrames*> unlit;
-    for (const FrameRecord& frame : frames) unlit.push_back(unlit_for(session, frame));
+    for (const FrameRecord& frame : frames) unlit.push_back(unlit_for(session, frame, served));
     return std::make_unique<MergedPhoto>(session, frames, unlit);
 }
 
-const UnlitFrames* FrameBands::unlit_for(const Session& session, const FrameRecord& frame) {
+const UnlitFrames* FrameBands::unlit_for(const Session& session, const FrameRecord& frame,
+                                         const std::vector<FrameRecord>& served) {
     auto known = std::find_if(unlit_.begin(), unlit_.end(), [&](const auto& unlit) { return unlit->fits(frame); });
-    if (known == unlit_.end()) known = unlit_.insert(unlit_.end(), std::make_unique<UnlitFrames>(session, frame));
+    if (known == unlit_.end())
+        known = unlit_.insert(unlit_.end(), std::make_unique<UnlitFrames>(session, frame, served));
     return (*known)->empty() ? nullptr : known->get();
 }
 
@@ -207,24 +223,56 @@ void FrameBands::read_next(int rows, PhotoBand& band) {
     next_row_ += rows;
 }
 
+void for_bands(FrameBands& photographs, const WorkContext& work, ProgressUpdate progress,
+               const std::function<void(const PhotoBand&)>& visit) {
+    const int height = photographs.size().height;
+    const int rows = rows_of_band(photographs.bytes_per_row(), height);
+    PhotoBand current, next;
+    on_threads_of(work, [&] { photographs.read_next(std::min(rows, height), current); });
+    for (int seen = 0; seen < height; std::swap(current, next)) {
+        step(work, progress);
+        seen += current.rows();
+        progress.done += static_cast<std::size_t>(current.rows());
+        const int coming = std::min(rows, height - seen);
+        on_threads_of(work, [&] {
+            if (coming > 0)
+                tbb::parallel_invoke([&] { photographs.read_next(coming, next); }, [&] { visit(current); });
+            else
+                visit(current);
+        });
+    }
+}
+
+std::size_t pictures_at_once(std::size_t bytes) {
+    return std::max<std::size_t>(1, whole_pictures / std::max<std::size_t>(bytes, 1));
+}
+
+void for_radiances(const Session& session, const std::vector<FrameRecord>& frames, const WorkContext& work,
+                   const std::function<void(std::size_t, const Radiance&)>& visit) {
+    if (frames.empty()) return;
+    const auto first_size = static_cast<std::size_t>(open_frame_rows(session, frames.front())->size().area());
+    const std::size_t at_once = pictures_at_once(first_size * (sizeof(cv::Vec3f) + 1));
+    for (std::size_t first = 0; first < frames.size(); first += at_once) {
+        const auto begin = frames.begin() + static_cast<std::ptrdiff_t>(first);
+        const auto end = frames.begin() + static_cast<std::ptrdiff_t>(std::min(first + at_once, frames.size()));
+        const std::vector<Radiance> some = read_radiances(session, {begin, end}, work);
+        for (std::size_t i = 0; i < some.size(); ++i) visit(first + i, some[i]);
+    }
+}
+
 std::vector<Radiance> read_radiances(const Session& session, const std::vector<FrameRecord>& frames,
                                      const WorkContext& work) {
     FrameBands bands(session, frames);
     std::vector<Radiance> read(frames.size());
     for (Radiance& radiance : read) radiance = {cv::Mat3f(bands.size()), cv::Mat1b(bands.size())};
-    const int height = bands.size().height;
-    PhotoBand band;
-    for (int row = 0; row < height; row += rows_at_once) {
-        step(work, {"reading frames", static_cast<std::size_t>(row), static_cast<std::size_t>(height), ""});
-        const cv::Range rows(row, std::min(row + rows_at_once, height));
-        on_threads_of(work, [&] {
-            bands.read_next(rows.size(), band);
-            tbb::parallel_for(std::size_t{0}, read.size(), [&](std::size_t i) {
-                radiance_of(band.photos[i]).copyTo(read[i].image.rowRange(rows));
-                clipped_of(band.photos[i]).copyTo(read[i].clipped.rowRange(rows));
-            });
+    const auto height = static_cast<std::size_t>(bands.size().height);
+    for_bands(bands, work, {"reading frames", 0, height, ""}, [&](const PhotoBand& band) {
+        const cv::Range rows(band.first_row, band.first_row + band.rows());
+        tbb::parallel_for(std::size_t{0}, read.size(), [&](std::size_t i) {
+            radiance_of(band.photos[i]).copyTo(read[i].image.rowRange(rows));
+            clipped_of(band.photos[i]).copyTo(read[i].clipped.rowRange(rows));
         });
-    }
+    });
     return read;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <vector>
@@ -41,8 +42,10 @@ public:
     void read_next(int rows, PhotoBand& band);
 
 private:
-    std::unique_ptr<PhotoReader> open(const Session& session, const FrameRecord& photograph);
-    const UnlitFrames* unlit_for(const Session& session, const FrameRecord& frame);
+    std::unique_ptr<PhotoReader> open(const Session& session, const FrameRecord& photograph,
+                                      const std::vector<FrameRecord>& served);
+    const UnlitFrames* unlit_for(const Session& session, const FrameRecord& frame,
+                                 const std::vector<FrameRecord>& served);
 
     cv::Size size_;
     std::vector<std::unique_ptr<UnlitFrames>> unlit_;
@@ -58,6 +61,20 @@ struct Radiance {
     cv::Mat3f image;
     cv::Mat1b clipped;  ///< 255 where any channel was at full scale
 };
+
+/// Passes over photographs from the top: `visit` sees band after band, each while the next is read. Two bands are in
+/// memory, of 64 rows or as many fewer (not below 16) as keep each within 32 MiB. `progress.done` counts rows from
+/// where it is.
+void for_bands(FrameBands& photographs, const WorkContext& work, ProgressUpdate progress,
+               const std::function<void(const PhotoBand&)>& visit);
+
+/// Passes over `frames` one by one in their order, each whole as radiance. So many are in memory as 512 MiB hold, at
+/// least one: frames that share dark frames are the quicker the more of them are read together.
+void for_radiances(const Session& session, const std::vector<FrameRecord>& frames, const WorkContext& work,
+                   const std::function<void(std::size_t, const Radiance&)>& visit);
+
+/// How many pictures of `bytes` each are held at a time where one after the other is needed whole.
+std::size_t pictures_at_once(std::size_t bytes);
 
 /// All of `frames` in their order, whole.
 std::vector<Radiance> read_radiances(const Session& session, const std::vector<FrameRecord>& frames,

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "processing/calibration/intensity.h"
 #include "processing/calibration/light_geometry.h"
@@ -10,14 +11,15 @@
 #include "processing/formats/json_file.h"
 #include "processing/formats/map_files.h"
 #include "processing/formats/png.h"
+#include "processing/formats/report/page_picture.h"
 #include "processing/formats/report/report.h"
 #include "processing/maps/srgb.h"
 #include "processing/pipeline/ball_picture.h"
 #include "processing/pipeline/default_relit.h"
 #include "processing/pipeline/false_colour.h"
+#include "processing/pipeline/photographs_seen.h"
 #include "processing/pipeline/provenance.h"
 #include "processing/pipeline/session_files.h"
-#include "processing/pipeline/stack.h"
 #include "processing/pipeline/stages.h"
 #include "processing/pipeline/steps.h"
 
@@ -55,30 +57,21 @@ void add_facts(const Session& session, ReportContent& content) {
         content.facts.emplace_back("Event", event.when + " " + event.what);
 }
 
-/// What the frames themselves show: their mean, and how they are exposed.
-void add_photographs(const PhotoStack& stack, ReportContent& content) {
-    cv::Mat3f mean(stack.size(), cv::Vec3f(0, 0, 0));
-    for (const cv::Mat3f& image : stack.images) mean += image;
-    mean /= static_cast<double>(stack.images.size());
-    content.pictures.push_back({viewable(mean, viewing_gain(mean, stack.mask)), "Mean photograph",
-                                fmt::format("Mean of {} photographs, brightened for viewing", stack.images.size())});
-    std::vector<double> bins(histogram_bins, 0.0);
-    double count = 0;
-    for (const cv::Mat3f& image : stack.images)
-        for (int y = 0; y < image.rows; ++y)
-            for (int x = 0; x < image.cols; ++x) {
-                if (!stack.mask(y, x)) continue;
-                const cv::Vec3f& p = image(y, x);
-                const double value = std::clamp<double>(std::max({p[0], p[1], p[2]}), 0.0, 1.0);
-                bins[std::min(static_cast<std::size_t>(value * histogram_bins), histogram_bins - 1)] += 1;
-                count += 1;
-            }
-    for (double& bin : bins) bin /= std::max(count, 1.0);
-    content.exposure_histogram = bins;
+/// As small as a page shows it; `file`, from the session's folder, has all of it.
+void add_picture(const cv::Mat3b& image, std::string title, std::string caption, std::string file,
+                 std::vector<ReportPicture>& pictures) {
+    pictures.push_back({for_page(image), std::move(title), std::move(caption), std::move(file)});
 }
 
-void add_calibration(const Session& session, const ResultFiles& files, ReportContent& content,
-                     const WorkContext& work) {
+/// What the frames themselves show: their mean, and how they are exposed.
+void add_photographs(const PhotographsSeen& seen, ReportContent& content) {
+    add_picture(viewable(seen.mean, viewing_gain(seen.mean, seen.mask)), "Mean photograph",
+                fmt::format("Mean of {} photographs, brightened for viewing", seen.photographs), "", content.pictures);
+    content.exposure_histogram = seen.exposure;
+}
+
+void add_calibration(const Session& session, const ResultFiles& files, const cv::Mat3f& brightest,
+                     ReportContent& content, const WorkContext& work) {
     const Calibration calibration = read_calibration(files.calibration).calibration;
     content.lights = calibration.lights;
     content.condition_number = calibration.condition_number;
@@ -90,7 +83,8 @@ void add_calibration(const Session& session, const ResultFiles& files, ReportCon
     content.facts.emplace_back("Intensities", name(calibration.intensity_origin));
     for (const std::string& rejected : calibration.rejected) content.facts.emplace_back("Left out", rejected);
     if (calibration.balls.empty()) return;
-    const BallView view = view_of_balls(load_ball_frames(session, work).frames, calibration.balls);
+    const bool separate = !photographs_of(session, FrameKind::ball).empty();
+    const BallView view = view_of_balls(separate ? brightest_of_ball(session, work) : brightest, calibration.balls);
     ReportBall ball{view.image, {}, {}};
     for (const Ball& found : calibration.balls) {
         const cv::Point2d centre = view.in_view(found.x, found.y);
@@ -112,17 +106,18 @@ void add_confidence(const ResultFiles& files, const cv::Mat1b& valid, ReportCont
     const cv::Mat1f used = read_exr_channel(files.confidence, "lights_used");
     double least = 0, most = 0;
     cv::minMaxLoc(used, &least, &most, nullptr, nullptr, valid);
-    content.pictures.push_back(
-        {heat(used, valid, std::max(most, 1.0)), "Lights used",
-         least < most ? fmt::format("Photographs behind each normal, from {:.0f} to {:.0f} (white)", least, most)
-                      : fmt::format("{:.0f} photographs behind every normal", most)});
+    add_picture(heat(used, valid, std::max(most, 1.0)), "Lights used",
+                least < most ? fmt::format("Photographs behind each normal, from {:.0f} to {:.0f} (white)", least, most)
+                             : fmt::format("{:.0f} photographs behind every normal", most),
+                "results/confidence.exr", content.pictures);
     const std::optional<cv::Mat1f> sigma = find_exr_channel(files.confidence, "sigma_deg");
     if (!sigma) return;
     cv::Mat3f grey;
     cv::merge(std::vector<cv::Mat>{*sigma, *sigma, *sigma}, grey);
     const double top = 1.0 / viewing_gain(grey, valid, 99.0);
-    content.pictures.push_back({heat(*sigma, valid, top), "Predicted error of the normal",
-                                fmt::format("One standard deviation of its angle; white is {:.3g}°", top)});
+    add_picture(heat(*sigma, valid, top), "Predicted error of the normal",
+                fmt::format("One standard deviation of its angle; white is {:.3g}°", top), "results/confidence.exr",
+                content.pictures);
 }
 
 /// "12.3 mm in all, 2 parts, each about its own mean"
@@ -142,29 +137,31 @@ void add_normals(const ResultFiles& files, ReportContent& content) {
     const AlbedoMap albedo = read_albedo_map(files.albedo, normals.valid);
     const cv::Mat1f residual = read_exr_channel(files.confidence, "residual");
     const double gain = viewing_gain(albedo.albedo, albedo.valid);
-    content.pictures.push_back(
-        {normal_colours(normals), "Normals", "Red = right, green = up, blue = towards the camera"});
-    content.pictures.push_back(
-        {viewable(albedo.albedo, gain), "Albedo", fmt::format("The unshaded image, brightened {:.3g} times", gain)});
+    add_picture(normal_colours(normals), "Normals", "Red = right, green = up, blue = towards the camera",
+                "results/normals.png", content.pictures);
+    add_picture(viewable(albedo.albedo, gain), "Albedo",
+                fmt::format("The unshaded image, brightened {:.3g} times", gain), "results/albedo.png",
+                content.pictures);
     cv::Mat3f grey;
     cv::merge(std::vector<cv::Mat>{residual, residual, residual}, grey);
     const double top = 1.0 / viewing_gain(grey, normals.valid, 99.0);
-    content.pictures.push_back(
-        {heat(residual, normals.valid, top), "Residual",
-         fmt::format("What the solver's law leaves unexplained; white is {:.3g} of full scale", top)});
+    add_picture(heat(residual, normals.valid, top), "Residual",
+                fmt::format("What the solver's law leaves unexplained; white is {:.3g} of full scale", top),
+                "results/confidence.exr", content.pictures);
     add_confidence(files, normals.valid, content);
     if (!fs::exists(files.height)) return;
     const cv::Mat1f height = read_exr_channel(files.height, "Y");
     double low = 0, high = 0;
     cv::minMaxLoc(height, &low, &high, nullptr, nullptr, normals.valid);
-    content.pictures.push_back({heat(cv::Mat(height - low), normals.valid, std::max(high - low, 1e-6)), "Height",
-                                fmt::format("From dark (far) to white (near): {}", height_span(files, high - low))});
+    add_picture(heat(cv::Mat(height - low), normals.valid, std::max(high - low, 1e-6)), "Height",
+                fmt::format("From dark (far) to white (near): {}", height_span(files, high - low)),
+                "results/height.exr", content.pictures);
 }
 
 void add_texels(const ResultFiles& files, ReportContent& content) {
     const IndexMap index = read_index_map(files.index);
-    content.pictures.push_back(
-        {false_colours(index), "Texels", fmt::format("{} texels in false colours", index.texels)});
+    add_picture(false_colours(index), "Texels", fmt::format("{} texels in false colours", index.texels),
+                "texels/index.png", content.pictures);
 }
 
 /// Timings and warnings that the stages left in their summaries.
@@ -200,7 +197,9 @@ std::vector<fs::path> add_relit(const Session& session, const ResultFiles& files
     for (RelitPicture& picture : relight_by_default(load_shaded_scene(session), work)) {
         written.push_back(files.results_folder / ("relit-" + picture.name + ".png"));
         write_png(written.back(), picture.image);
-        content.relit.push_back({std::move(picture.image), picture.name, picture.caption});
+        add_picture(picture.image, picture.name, picture.caption, "results/relit-" + picture.name + ".png",
+                    content.relit);
+        picture.image.release();
     }
     describe_pictures(session, "relit", written);
     return written;
@@ -215,8 +214,11 @@ ReportSummary run_report(const Session& session, const WorkContext& work) {
     ReportContent content;
     content.title = session.info().object.empty() ? session.folder().filename().string() : session.info().object;
     add_facts(session, content);
-    add_photographs(load_stack(session, work), content);
-    if (fs::exists(files.calibration)) add_calibration(session, files, content, work);
+    {
+        const PhotographsSeen seen = see_photographs(session, histogram_bins, work);
+        add_photographs(seen, content);
+        if (fs::exists(files.calibration)) add_calibration(session, files, seen.brightest, content, work);
+    }
     if (fs::exists(files.normals)) add_normals(files, content);
     if (fs::exists(files.index)) add_texels(files, content);
     if (fs::exists(files.shading)) summary.relit = add_relit(session, files, content, work);

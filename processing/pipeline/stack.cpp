@@ -17,14 +17,6 @@
 namespace darkbox {
 namespace {
 
-std::vector<FrameRecord> require_lit(const Session& session) {
-    std::vector<FrameRecord> lit = photographs_of(session, FrameKind::lit);
-    if (lit.empty())
-        throw InputError(fmt::format("{} has no lit frame", session.folder().string()),
-                         "capture or import photographs with a lamp on");
-    return lit;
-}
-
 /// Balls that the calibration found in view beside the object.
 std::vector<cv::Vec3d> balls_in_view(const Session& session) {
     const ResultFiles files(session.folder());
@@ -36,6 +28,14 @@ std::vector<cv::Vec3d> balls_in_view(const Session& session) {
 }
 
 }  // namespace
+
+std::vector<FrameRecord> require_lit(const Session& session) {
+    std::vector<FrameRecord> lit = photographs_of(session, FrameKind::lit);
+    if (lit.empty())
+        throw InputError(fmt::format("{} has no lit frame", session.folder().string()),
+                         "capture or import photographs with a lamp on");
+    return lit;
+}
 
 PhotoStack load_stack(const Session& session, const WorkContext& work) {
     const std::vector<FrameRecord> lit = require_lit(session);
@@ -145,21 +145,6 @@ cv::Mat1b SessionPhotos::kept_mask() const {
     cv::Mat1b kept;
     for (int row = 0; row < whole.rows; row += keep_every_) kept.push_back(whole.row(row));
     return kept;
-}
-
-BallFrames load_ball_frames(const Session& session, const WorkContext& work) {
-    const std::vector<FrameRecord> lit = require_lit(session);
-    const std::vector<FrameRecord> own = photographs_of(session, FrameKind::ball);
-    if (!own.empty() && own.size() != lit.size())
-        throw InputError(fmt::format("{} has {} frames of the ball for {} of the object", session.folder().string(),
-                                     own.size(), lit.size()),
-                         "photograph the ball once under each lamp");
-    BallFrames ball;
-    ball.separate = !own.empty();
-    for (Radiance& radiance : read_radiances(session, ball.separate ? own : lit, work))
-        ball.frames.push_back(std::move(radiance.image));
-    for (const FrameRecord& frame : lit) ball.files.push_back(basename_of(frame));
-    return ball;
 }
 
 }  // namespace darkbox

@@ -28,7 +28,7 @@ ordered_json light_json(const Light& light) {
 }
 
 ordered_json ball_json(const Ball& ball) {
-    ordered_json json{{"x", ball.x}, {"y", ball.y}, {"radius", ball.radius}};
+    ordered_json json{{"x", ball.x}, {"y", ball.y}, {"radius", ball.radius}, {"confidence", ball.confidence}};
     if (ball.ellipse)
         json["ellipse"] = {{"along", ball.ellipse->along},
                            {"across", ball.ellipse->across},

@@ -5,13 +5,15 @@
 #include "acquisition/frame/error.h"
 #include "processing/formats/json_file.h"
 #include "processing/formats/map_files.h"
+#include "processing/pipeline/lit_photos.h"
 #include "processing/pipeline/provenance.h"
 #include "processing/pipeline/session_files.h"
 #include "processing/pipeline/session_geometry.h"
-#include "processing/pipeline/stack.h"
+#include "processing/pipeline/shade_stage.h"
 #include "processing/pipeline/stages.h"
 #include "processing/pipeline/steps.h"
 #include "processing/pipeline/summary_json.h"
+#include "processing/shading/shading_bands.h"
 
 namespace darkbox {
 namespace {
@@ -62,19 +64,26 @@ TexelsSummary run_texels(const Session& session, const TexelOptions& options, co
 }
 
 ShadeSummary run_shade(const Session& session, const ShadingOptions& options, const WorkContext& work) {
+    return run_shade(session, options, ShadingBands{}, work);
+}
+
+ShadeSummary run_shade(const Session& session, const ShadingOptions& options, const ShadingBands& bands,
+                       const WorkContext& work) {
     options.validate();
+    bands.validate();
     const ResultFiles files(session.folder());
     const Lights lights = load_lights(session);
     ShadeSummary summary;
     Stopwatch watch;
     const Maps maps = read_maps(session);
     const IndexMap index = read_index(session);
-    const PhotoStack stack = load_stack(session, work);
+    LitPhotos photos(session);
     summary.seconds.read = watch.lap();
     step(work, {"measuring shading maps", 0, 1, ""});
     ShadingOptions with_geometry = options;
     with_geometry.geometry = scene_geometry(files);
-    const ShadingResult shaded = shading_maps(stack, lights, maps.normals, maps.albedo, index, with_geometry, work);
+    const ShadingResult shaded =
+        shading_maps(photos, lights, maps.normals, maps.albedo, index, with_geometry, bands, work);
     watch.lap();
     summary.seconds.solve = shaded.seconds;
     summary.texels = shaded.maps.texels;

@@ -22,11 +22,31 @@ std::vector<FrameRecord> unlit_like(const Session& session, FrameKind kind, cons
 
 }  // namespace
 
-UnlitFrames::UnlitFrames(const Session& session, const FrameRecord& lit) : like_(lit) {
+UnlitFrames::UnlitFrames(const Session& session, const FrameRecord& lit, const std::vector<FrameRecord>& served)
+    : like_(lit) {
     records_ = unlit_like(session, FrameKind::ambient, lit);
     ambient_ = !records_.empty();
-    if (!ambient_) records_ = unlit_like(session, FrameKind::dark, lit);
+    if (ambient_)
+        keep_around(served);
+    else
+        records_ = unlit_like(session, FrameKind::dark, lit);
     for (const FrameRecord& record : records_) frames_.push_back(open_frame_rows(session, record));
+}
+
+/// From the last one before the first of them to the first one after the last.
+void UnlitFrames::keep_around(const std::vector<FrameRecord>& served) {
+    auto earliest = like_.timestamp_ns, latest = like_.timestamp_ns;
+    for (const FrameRecord& frame : served) {
+        if (!fits(frame)) continue;
+        earliest = std::min(earliest, frame.timestamp_ns);
+        latest = std::max(latest, frame.timestamp_ns);
+    }
+    auto end = std::ranges::upper_bound(records_, latest, {}, &FrameRecord::timestamp_ns);
+    if (end != records_.end()) ++end;
+    records_.erase(end, records_.end());
+    auto begin = std::ranges::upper_bound(records_, earliest, {}, &FrameRecord::timestamp_ns);
+    if (begin != records_.begin()) --begin;
+    records_.erase(records_.begin(), begin);
 }
 
 bool UnlitFrames::fits(const FrameRecord& lit) const {

@@ -15,7 +15,9 @@ namespace darkbox {
 /// with the lit frames. Thread-compatible.
 class UnlitFrames {
 public:
-    UnlitFrames(const Session& session, const FrameRecord& lit);
+    /// For those of the `served` lit frames that are like `lit`, which is one of them: of ambient frames only what lies
+    /// around them in time is read.
+    UnlitFrames(const Session& session, const FrameRecord& lit, const std::vector<FrameRecord>& served);
 
     bool fits(const FrameRecord& lit) const;
     bool empty() const { return frames_.empty(); }
@@ -29,6 +31,8 @@ public:
     cv::Mat3f level_for(const FrameRecord& lit) const;
 
 private:
+    void keep_around(const std::vector<FrameRecord>& served);
+
     FrameRecord like_;
     bool ambient_ = false;
     std::vector<FrameRecord> records_;  ///< in order of time

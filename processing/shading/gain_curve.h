@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -30,6 +31,9 @@ public:
     void add(double r, const cv::Vec3d& albedo, const cv::Vec3d& radiance);
 
     GainCurve curve() const;
+
+    /// Memory of one with so many levels.
+    static std::size_t bytes(int levels) { return 2 * static_cast<std::size_t>(levels - 1) * sizeof(Interval); }
 
 private:
     /// Normal equations of the gains at both ends of the interval between two levels.

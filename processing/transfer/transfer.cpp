@@ -185,6 +185,7 @@ void measure(const TransferSource& source, const NormalMap& target, Guides guide
         coverage_deg({guides.from.normal, guides.from.valid}, {guides.onto.normal, guides.onto.valid});
     guides = {};
     result.coherence = coherence(result.coordinates);
+    if (const auto angle = angles(source.normals, target, result.coordinates)) result.guide_error_deg = angle->mean_deg;
     const float white = source.white.value_or(white_level(source.albedo));
     PatchLayers from, onto;
     {

@@ -64,7 +64,9 @@ struct TransferResult {
     /// As TransferMeasures has them; patches of the target on a coarser grid. None where there is nothing to measure.
     std::optional<double> patch_energy;
     std::optional<double> histogram_distance;
-    double seconds = 0;  ///< without the figures
+    std::optional<double>
+        guide_error_deg;  ///< mean angle from a target normal to that of the source pixel it was given
+    double seconds = 0;   ///< without the figures
 };
 
 /// Texture replacement: source coordinates are synthesised such that normals and texture fit; albedo, index and fine

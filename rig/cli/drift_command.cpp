@@ -30,6 +30,8 @@ Json to_json(const LampDrift& lamp) {
               {"raw_deg", lamp.raw_deg}, {"sigma_deg", lamp.sigma_deg},   {"sigma_assumed", lamp.sigma_assumed},
               {"p_value", lamp.p_value}};
     if (!lamp.partner.empty()) json["partner"] = lamp.partner;
+    if (lamp.farther_mm) json["farther_mm"] = *lamp.farther_mm;
+    if (lamp.farther_mm) json["farther_sigma_mm"] = lamp.farther_sigma_mm;
     if (lamp.intensity_ratio) json["intensity_ratio"] = *lamp.intensity_ratio;
     return json;
 }

@@ -229,6 +229,9 @@ void add_evaluate_command(CommandLine& line) {
     command.add_option("--block", a->options.bootstrap.block_px, "Side of the blocks that --compare-solvers draws, px")
         ->capture_default_str();
     command.add_option("--lights", a->lights, "True light directions, in the frames' order");
+    command
+        .add_option("--memory-mib", a->options.memory_mib, "Memory for all photographs and what is solved from them")
+        ->capture_default_str();
     command.add_flag("--no-held-out", a->no_held_out, "Skip the prediction of each photograph without it");
 }
 

@@ -57,6 +57,9 @@ void add_import_command(CommandLine& line) {
     command.add_option("--object", a->options.object, "Name of the object; default: the first folder's name");
     add_object_options(command, a->object);
     command.add_option("--ball-images", a->options.ball_images, "Folder with a mirror ball under the same lamps");
+    command.add_option("--flat-images", a->options.flat_images,
+                       "Folder with a white or grey plane in the object's place, facing the camera, under the same "
+                       "lamps: tells their intensities");
     command.add_option("--ball", a->balls, "A ball's outline, pixels: X,Y,R; once for each ball");
     command.add_option("--ball-diameter", a->options.ball_diameter_mm, "Of the mirror balls, mm: tells the scale");
     command.add_option("--ball-mask", a->options.ball_mask, "Picture that is white on the ball");

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "processing/normals/solver_names.h"
+#include "processing/pipeline/shade_stage.h"
 #include "processing/pipeline/stages.h"
 #include "processing/pipeline/summary_json.h"
 #include "rig/cli/arguments.h"
@@ -13,7 +14,11 @@
 namespace darkbox {
 namespace {
 
+constexpr int default_memory_mib = 4096;
+
 struct StageArguments {
+    StageArguments() { options.normals.stereo.memory_mib = default_memory_mib; }
+
     std::filesystem::path session;
     ProcessOptions options;
     std::vector<std::string> balls;
@@ -51,7 +56,8 @@ std::string describe(const CalibrateSummary& summary) {
     const auto near = std::count_if(c.lights.begin(), c.lights.end(), [](const Light& light) { return light.near; });
     if (near > 0) text += fmt::format("\n{} lamps are near: their places are known in mm", near);
     for (const Ball& ball : c.balls)
-        text += fmt::format("\nball at ({:.1f}, {:.1f}), radius {:.1f} px", ball.x, ball.y, ball.radius);
+        text += fmt::format("\nball at ({:.1f}, {:.1f}), radius {:.1f} px, confidence {:.2f}", ball.x, ball.y,
+                            ball.radius, ball.confidence);
     return text + what_went(summary.removed, "lights");
 }
 
@@ -139,10 +145,6 @@ void add_normals_options(CLI::App& command, StageArguments& a) {
         .add_option("--solver", a.options.normals.stereo.solver,
                     "lsq: least squares over all lights; robust: leaves out shadows and highlights")
         ->transform(one_of(solvers));
-    command
-        .add_option("--memory-mib", a.options.normals.stereo.memory_mib,
-                    "Memory for photographs and maps while solving")
-        ->capture_default_str();
     command.add_flag_callback(
         "--no-surface", [&a] { a.options.normals.surface = false; }, "Leave out height.exr and surface.ply");
     const std::map<std::string, IntensityChoice> choices{{"auto", IntensityChoice::automatic},
@@ -174,6 +176,20 @@ void add_shade_options(CLI::App& command, StageArguments& a) {
         ->capture_default_str();
 }
 
+/// Of the stages that can do with less.
+void add_memory_option(CLI::App& command, StageArguments& a) {
+    command
+        .add_option("--memory-mib", a.options.normals.stereo.memory_mib,
+                    "Memory for photographs and maps at a time, of normals, height and shading")
+        ->capture_default_str();
+}
+
+ShadingBands shading_bands(const ProcessOptions& options) {
+    ShadingBands bands;
+    bands.memory_mib = options.normals.stereo.memory_mib;
+    return bands;
+}
+
 /// A command over one session. `stage` takes (Session, ProcessOptions, WorkContext).
 template <class Stage>
 CLI::App& add_stage(CommandLine& line, const std::string& name, const std::string& description,
@@ -197,26 +213,28 @@ void add_stage_commands(CommandLine& line) {
                                         return run_calibrate(s, o.calibrate, w);
                                     }),
                           *a);
-    add_normals_options(add_stage(line, "normals", "Photometric stereo: normals and unshaded albedo", a,
-                                  [](const Session& s, const ProcessOptions& o, const WorkContext& w) {
-                                      return run_normals(s, o.normals, w);
-                                  }),
-                        *a);
+    CLI::App& normals = add_stage(
+        line, "normals", "Photometric stereo: normals and unshaded albedo", a,
+        [](const Session& s, const ProcessOptions& o, const WorkContext& w) { return run_normals(s, o.normals, w); });
+    add_memory_option(normals, *a);
+    add_normals_options(normals, *a);
     add_texels_options(add_stage(line, "texels", "Cluster the unshaded picture into texels", a,
                                  [](const Session& s, const ProcessOptions& o, const WorkContext& w) {
                                      return run_texels(s, o.texels, w);
                                  }),
                        *a);
-    add_shade_options(add_stage(line, "shade", "Shading maps: each texel's radiance against the light", a,
+    CLI::App& shade = add_stage(line, "shade", "Shading maps: each texel's radiance against the light", a,
                                 [](const Session& s, const ProcessOptions& o, const WorkContext& w) {
-                                    return run_shade(s, o.shading, w);
-                                }),
-                      *a);
+                                    return run_shade(s, o.shading, shading_bands(o), w);
+                                });
+    add_memory_option(shade, *a);
+    add_shade_options(shade, *a);
     add_stage(line, "report", "Write the session's report.html", a,
               [](const Session& s, const ProcessOptions&, const WorkContext& w) { return run_report(s, w); });
     CLI::App& process =
         add_stage(line, "process", "All stages in order, then the report", a,
                   [](const Session& s, const ProcessOptions& o, const WorkContext& w) { return run_process(s, o, w); });
+    add_memory_option(process, *a);
     add_calibrate_options(process, *a);
     add_normals_options(process, *a);
     add_texels_options(process, *a);

@@ -83,6 +83,8 @@ struct Target {
 Target load_target(const TransferArguments& a) {
     const bool near = !a.relight.lamp_positions.empty();
     if (fs::is_directory(a.target)) {
+        if (!a.target_mask.empty())
+            throw UsageError("--target-mask goes with a plain normal map, a session has its own mask", "leave it out");
         const Session session = Session::open(a.target);
         Target target{load_scene(session).normals};
         if (near) target.geometry = load_geometry(session);
@@ -201,6 +203,7 @@ CommandResult run(const TransferArguments& a, const WorkContext& work) {
                    {"patch_energy", json_of(moved.patch_energy)},
                    {"coherence", moved.coherence},
                    {"histogram_distance", json_of(moved.histogram_distance)},
+                   {"guide_error_deg", json_of(moved.guide_error_deg)},
                    {"coverage_deg", moved.coverage_deg},
                    {"relit", Json::array()},
                    {"applied", Json::array()}};

@@ -68,7 +68,7 @@ LampAgeing fitted(const std::string& lamp, Readings readings) {
 }  // namespace
 
 std::optional<LampAgeing> trend_of(const std::string& what, Readings readings) {
-    if (readings.size() < fewest_readings) return std::nullopt;
+    if (readings.size() < fewest_readings || readings.front().day == readings.back().day) return std::nullopt;
     return fitted(what, std::move(readings));
 }
 

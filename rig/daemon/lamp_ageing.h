@@ -28,7 +28,8 @@ struct LampAgeing {
     double left = 1;               ///< of its light at first, by the line, at the last reading
 };
 
-/// The same of any series of positive readings, in the order of their days; no value for fewer than three.
+/// The same of any series of positive readings, in the order of their days; no value for fewer than three, or
+/// all of one day.
 std::optional<LampAgeing> trend_of(const std::string& what, std::vector<LampAgeing::Reading> readings);
 
 /// Of "2026-01-31T...": days since 1970; no value for another form.

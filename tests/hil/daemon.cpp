@@ -32,7 +32,7 @@ int parent_of(int process) {
 Daemon::Daemon(const fs::path& folder, const fs::path& rig, const std::vector<std::string>& through)
     : folder_(folder), child_(command(folder, rig, through), folder / "darkboxd"), client_(folder / "socket") {
     const auto open = [&] { return client_.answers() && client_.call("GET", "status").at("state") == "Idle"; };
-    if (!comes_true(open, std::chrono::seconds(30))) throw std::runtime_error("darkboxd does not start: " + log());
+    if (!comes_true(open, start_of_a_program)) throw std::runtime_error("darkboxd does not start: " + log());
     const std::vector<int> all = processes("darkboxd");
     if (all.size() != 1) throw std::runtime_error("there are other processes of the name darkboxd");
     process_ = all.front();

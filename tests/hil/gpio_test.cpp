@@ -174,7 +174,7 @@ TEST_F(Gpio, DarkboxLampsDrivesThem) {
     const std::string darkbox = test::program("darkbox");
 
     test::ChildProcess on({darkbox, "lamps", "on", "lamp-08", "--seconds", "15", "--rig", rig}, folder.path() / "on");
-    ASSERT_TRUE(test::comes_true([&] { return chip().is_high(7); })) << on.err();
+    ASSERT_TRUE(test::comes_true([&] { return chip().is_high(7); }, test::start_of_a_program)) << on.err();
     EXPECT_THAT(chip().high_lines(), ElementsAre(7));
     const test::Printed second = test::shell(darkbox + " lamps dark --rig " + rig);
     EXPECT_EQ(second.status, 1);

@@ -31,8 +31,11 @@ std::string text_of(const std::filesystem::path& file);
 /// Throws when the kernel does not take it.
 void put(const std::string& text, const std::filesystem::path& file);
 
-/// Asked again and again; emulation is slow, so the limit is far from what a real machine takes.
+/// Asked again and again; emulation is slow, and slower where its host does other things as well, so the limit is far
+/// from what a real machine takes.
 bool comes_true(const std::function<bool()>& condition, std::chrono::seconds limit = std::chrono::seconds(40));
+/// For what a program does as soon as it has started: that alone may take half a minute.
+constexpr std::chrono::seconds start_of_a_program{120};
 
 /// A program of this build.
 std::string program(const std::string& name);

@@ -172,8 +172,7 @@ TEST_F(UsbLampsDriver, AHungFirmwareIsResetByItsWatchdogAndTakenUpAgain) {
 
 TEST_F(UsbLampsDriver, AKilledDriverLeavesThemToTheBoard) {
     test::ChildProcess driver({test::program("darkbox"), "lamps", "on", "lamp-04", "--rig", rig}, folder.path() / "on");
-    constexpr auto start_of_a_program = std::chrono::seconds(120);
-    ASSERT_TRUE(test::comes_true([&] { return board->lit() == bit_of(3); }, start_of_a_program)) << driver.err();
+    ASSERT_TRUE(test::comes_true([&] { return board->lit() == bit_of(3); }, test::start_of_a_program)) << driver.err();
     driver.signal(SIGKILL);
     driver.wait();
     EXPECT_TRUE(test::comes_true([&] { return board->is_dark(); }));

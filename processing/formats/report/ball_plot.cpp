@@ -5,6 +5,7 @@
 
 #include "processing/formats/report/ellipse.h"
 #include "processing/formats/report/html.h"
+#include "processing/formats/report/page_picture.h"
 #include "processing/formats/report/plots.h"
 
 namespace darkbox {
@@ -46,7 +47,7 @@ std::string ball_plot(const ReportBall& ball, const Lights& lights) {
     std::string svg = fmt::format(
         "<svg class='plot ball' viewBox='-0.5 -0.5 {0} {1}' role='img' aria-label='the mirror ball'><image x='-0.5' "
         "y='-0.5' width='{0}' height='{1}' href='{2}' style='image-rendering:pixelated'/>",
-        ball.image.cols, ball.image.rows, data_uri(ball.image));
+        ball.image.cols, ball.image.rows, data_uri(for_page(ball.image)));
     const double stroke = ball.image.cols / 400.0;
     for (const Ball& outline : ball.balls)
         svg += fmt::format("<circle class='outline' cx='{:.2f}' cy='{:.2f}' r='{:.2f}' stroke-width='{:.2f}'/>",

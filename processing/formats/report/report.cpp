@@ -26,9 +26,11 @@ std::string facts_html(const std::vector<std::pair<std::string, std::string>>& f
 }
 
 std::string picture_html(const ReportPicture& picture) {
-    return fmt::format("<figure><img src='{}' alt='{}'><figcaption><b>{}</b><span>{}</span></figcaption></figure>",
+    const std::string link =
+        picture.file.empty() ? std::string() : fmt::format(" <a href='{0}'>{0}</a>", escaped(picture.file));
+    return fmt::format("<figure><img src='{}' alt='{}'><figcaption><b>{}</b><span>{}{}</span></figcaption></figure>",
                        data_uri(picture.image), escaped(picture.title), escaped(picture.title),
-                       escaped(picture.caption));
+                       escaped(picture.caption), link);
 }
 
 std::string gallery_html(const char* heading, const char* kind, const std::vector<ReportPicture>& pictures) {

@@ -15,6 +15,7 @@ struct ReportPicture {
     cv::Mat3b image;  ///< R, G, B, for looking at
     std::string title;
     std::string caption;
+    std::string file = {};  ///< relative to the page: where all of it is; empty: nowhere
 };
 
 /// One frame's outline and reading on the ball picture.
@@ -38,7 +39,8 @@ struct ReportContent {
     std::vector<std::pair<std::string, double>> timings;  ///< stage, seconds
 };
 
-/// One self-contained page: pictures, plots and style are inside; no scripts; every name is escaped.
+/// One self-contained page: pictures, plots and style are inside; no scripts; every name is escaped. Files with more
+/// than a picture shows are linked beside it.
 std::string report_html(const ReportContent& content);
 
 }  // namespace darkbox

@@ -45,10 +45,14 @@ struct UsbTestbed::Bed {
 
 /// One board, and the URBs that its clients gave.
 struct UsbTestbed::Device {
-    /// What umockdev's thread has of a device: a client that dies late is answered after its device has ended.
+    /// One plugging in, as umockdev's thread has it: its socket stays until the bed ends, for umockdev aborts a client
+    /// that opened the node and finds no socket. Whoever comes after the cable was pulled, or after the device has
+    /// ended, is told ENODEV.
     struct Link {
+        explicit Link(Device* d) : device(d) {}
         std::mutex mutex;
-        Device* device = nullptr;  ///< guarded by mutex
+        Device* device;  ///< guarded by mutex
+        std::atomic<bool> here{true};
     };
     struct Urb {
         std::unique_ptr<UMockdevIoctlClient, Unref> client;  ///< kept, so that no later client has its address
@@ -60,40 +64,38 @@ struct UsbTestbed::Device {
 
     Device(Bed& b, int n, const std::filesystem::path& elf, const std::optional<lamp_protocol::Identity>& identity)
         : bed(b), number(n), board(elf, identity) {
-        link->device = this;
         board.on_presence = [this](bool present) { present ? appear() : vanish(); };
         appear();
     }
     ~Device() {
         vanish();
-        const std::lock_guard lock(link->mutex);
-        link->device = nullptr;
+        for (const std::shared_ptr<Link>& link : links) {
+            const std::lock_guard lock(link->mutex);
+            link->device = nullptr;
+        }
     }
 
     void appear();
     void vanish();
     static gboolean handle(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer link);
-    void answer(UMockdevIoctlClient* client);
+    void answer(UMockdevIoctlClient* client, bool here);
     void submit(UMockdevIoctlClient* client, UMockdevIoctlData* urb_data);
-    void reap(UMockdevIoctlClient* client, UMockdevIoctlData* pointer);
+    void reap(UMockdevIoctlClient* client, UMockdevIoctlData* pointer, bool here);
     void discard(UMockdevIoctlClient* client);
     void drop_the_departed();
 
     Bed& bed;
     int number;
-    std::shared_ptr<Link> link = std::make_shared<Link>();
-    UMockdevIoctlBase* handler = nullptr;
+    std::vector<std::shared_ptr<Link>> links;  ///< the last one is of the present node
     std::string syspath;
-    std::string node;
     std::list<Urb> urbs;  ///< on the handler's thread alone
-    std::atomic<bool> here{false};
-    PacedBoard board;  ///< the first to end: its thread uses the others
+    PacedBoard board;     ///< the first to end: its thread uses the others
 };
 
 void UsbTestbed::Device::appear() {
     const std::lock_guard lock(bed.mutex);
     const int address = bed.next_address++;
-    node = fmt::format("/dev/bus/usb/001/{:03}", address);
+    const std::string node = fmt::format("/dev/bus/usb/001/{:03}", address);
     const auto& d = board.device_descriptor;
     const std::string path = fmt::format("/devices/pci0000:00/0000:00:14.0/usb1/1-{}", number + 1);
     syspath = "/sys" + path;
@@ -106,23 +108,23 @@ void UsbTestbed::Device::appear() {
         "A: idProduct={:02x}{:02x}\\n\nA: bConfigurationValue=1\\n\nA: bNumConfigurations=1\\n\nA: speed=12\\n\n"
         "A: devpath={}\\n\nH: descriptors={}\n",
         path, address, node, address, address - 1, address, d[9], d[8], d[11], d[10], number + 1, hex);
+    links.push_back(std::make_shared<Link>(this));
+    UMockdevIoctlBase* handler = umockdev_ioctl_base_new();
+    g_signal_connect_data(
+        handler, "handle-ioctl", G_CALLBACK(&Device::handle), new std::shared_ptr<Link>(links.back()),
+        [](gpointer held, GClosure*) { delete static_cast<std::shared_ptr<Link>*>(held); }, GConnectFlags{});
+    umockdev_testbed_attach_ioctl(bed.testbed, node.c_str(), handler, nullptr);  // before anybody can open the node
+    g_object_unref(handler);
     GError* error = nullptr;
     if (umockdev_testbed_add_from_string(bed.testbed, device.c_str(), &error) == 0)
         throw std::runtime_error(fmt::format("umockdev: {}", error->message));
-    handler = umockdev_ioctl_base_new();
-    g_signal_connect_data(
-        handler, "handle-ioctl", G_CALLBACK(&Device::handle), new std::shared_ptr<Link>(link),
-        [](gpointer held, GClosure*) { delete static_cast<std::shared_ptr<Link>*>(held); }, GConnectFlags{});
-    umockdev_testbed_attach_ioctl(bed.testbed, node.c_str(), handler, nullptr);
-    here = true;
     umockdev_testbed_uevent(bed.testbed, syspath.c_str(), "add");
 }
 
 void UsbTestbed::Device::vanish() {
     const std::lock_guard lock(bed.mutex);
-    if (!here.exchange(false)) return;
+    if (links.empty() || !links.back()->here.exchange(false)) return;
     umockdev_testbed_uevent(bed.testbed, syspath.c_str(), "remove");
-    umockdev_testbed_detach_ioctl(bed.testbed, node.c_str(), nullptr);
     umockdev_testbed_remove_device(bed.testbed, syspath.c_str());
 }
 
@@ -130,7 +132,7 @@ gboolean UsbTestbed::Device::handle(UMockdevIoctlBase*, UMockdevIoctlClient* cli
     Link& held = **static_cast<std::shared_ptr<Link>*>(link);
     const std::lock_guard lock(held.mutex);
     if (held.device != nullptr)
-        held.device->answer(client);
+        held.device->answer(client, held.here);
     else
         umockdev_ioctl_client_complete(client, -1, ENODEV);
     return TRUE;
@@ -145,7 +147,7 @@ void UsbTestbed::Device::drop_the_departed() {
     });
 }
 
-void UsbTestbed::Device::answer(UMockdevIoctlClient* client) {
+void UsbTestbed::Device::answer(UMockdevIoctlClient* client, bool here) {
     const unsigned long request = umockdev_ioctl_client_get_request(client);
     UMockdevIoctlData* arg = umockdev_ioctl_client_get_arg(client);
     const auto complete = [&](long result, int error) { umockdev_ioctl_client_complete(client, result, error); };
@@ -153,7 +155,7 @@ void UsbTestbed::Device::answer(UMockdevIoctlClient* client) {
     if (request == USBDEVFS_REAPURBNDELAY) {
         const DataPtr pointer = resolve(arg, 0, sizeof(void*));
         if (!pointer) return complete(-1, EFAULT);
-        reap(client, pointer.get());
+        reap(client, pointer.get(), here);
     } else if (request == USBDEVFS_DISCARDURB) {
         discard(client);
     } else if (!here) {
@@ -211,7 +213,7 @@ void UsbTestbed::Device::submit(UMockdevIoctlClient* client, UMockdevIoctlData* 
     umockdev_ioctl_client_complete(client, 0, 0);
 }
 
-void UsbTestbed::Device::reap(UMockdevIoctlClient* client, UMockdevIoctlData* pointer) {
+void UsbTestbed::Device::reap(UMockdevIoctlClient* client, UMockdevIoctlData* pointer, bool here) {
     const auto request = board.take_ended(client, reap_patience);
     const auto found =
         std::find_if(urbs.begin(), urbs.end(), [&](const Urb& urb) { return request && urb.request == request; });

@@ -76,6 +76,29 @@ TEST(Drift, NearLampsAreComparedAsOneAndTheSameObjectSeesThem) {
     EXPECT_NEAR(lamp_of(drift, "lamp-1").moved_deg, 0, 1e-6);
 }
 
+TEST(Drift, ANearLampThatMovedAlongItsRayIsFoundByItsDistance) {
+    const RigLights before = standing_at(dome(12), 400);
+    RigLights after = before;
+    after.lights[4].near->position_mm *= 1.02;
+    const Drift drift = drift_between(before, after);
+    EXPECT_THAT(found(drift, LampFinding::moved), ElementsAre("lamp-5"));
+    EXPECT_NEAR(lamp_of(drift, "lamp-5").farther_mm.value(), 8, 1e-6);
+    EXPECT_NEAR(lamp_of(drift, "lamp-5").farther_sigma_mm, 1, 1e-9);
+    EXPECT_NEAR(lamp_of(drift, "lamp-5").moved_deg, 0, 1e-6);
+    EXPECT_THAT(drift.findings, ElementsAre(HasSubstr("stands 8 mm farther")));
+    after.lights[4].near->position_mm = before.lights[4].near->position_mm * 1.005;
+    EXPECT_TRUE(drift_between(before, after).steady()) << "2 mm are within an uncertainty of 1 mm";
+}
+
+TEST(Drift, AScaleReadOtherwiseIsNoLampsMovement) {
+    const RigLights before = standing_at(dome(12), 400);
+    RigLights after = before;
+    for (Light& light : after.lights) light.near->position_mm *= 1.03;
+    const Drift drift = drift_between(before, after);
+    EXPECT_TRUE(drift.steady());
+    EXPECT_NEAR(lamp_of(drift, "lamp-5").farther_mm.value(), 0, 1e-6);
+}
+
 TEST(Drift, SwappedLampsAreNamedOnceAsAPair) {
     RigLights after = dome(12);
     test::swap_lamps(after, 2, 7);

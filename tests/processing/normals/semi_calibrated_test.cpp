@@ -6,6 +6,7 @@
 #include <random>
 
 #include "processing/calibration/intensity.h"
+#include "tests/processing/normals/lit_sphere.h"
 #include "tests/support/textured_sphere.h"
 #include "tests/support/throws.h"
 
@@ -102,6 +103,47 @@ TEST(SemiCalibrated, TheSameBitsOnAnyNumberOfThreads) {
     const Lights a = estimate_intensities(scene.stack, without_intensities(lights), {}, one).lights;
     const Lights b = estimate_intensities(scene.stack, without_intensities(lights), {}, four).lights;
     for (std::size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].intensity, b[i].intensity);
+}
+
+/// Uneven lamps 150 mm from the centre of a sphere of 47 mm radius.
+test::LitSphere lit_by_near_lamps() {
+    Lights lights = uneven_lights(12);
+    for (Light& light : lights) light.near = LampPosition{light.direction * 150, {0, 0, 0}};
+    return {lights, test::lambert, 96, 75};
+}
+
+TEST(SemiCalibrated, NearLampsReachEachPixelInTheirOwnWay) {
+    const test::LitSphere scene = lit_by_near_lamps();
+    SemiCalibratedOptions options;
+    options.geometry.view = scene.view();
+    options.geometry.height_mm = scene.height_mm();
+    const Lights equal = without_intensities(scene.lights);
+    EXPECT_LE(worst_error(estimate_intensities(scene.stack, equal, options).lights, scene.lights), 0.005);
+    Lights distant = equal;
+    for (Light& light : distant) light.near.reset();
+    EXPECT_GE(worst_error(estimate_intensities(scene.stack, distant).lights, scene.lights), 0.05)
+        << "the scene must tell near lamps from distant ones";
+    EXPECT_THAT(test::input_error_of([&] { estimate_intensities(scene.stack, equal); }), HasSubstr("near"));
+}
+
+TEST(SemiCalibrated, RowsThatWereLeftOutDoNotMoveTheOthers) {
+    const test::LitSphere scene = lit_by_near_lamps();
+    SemiCalibratedOptions options;
+    options.geometry.view = scene.view();
+    options.geometry.height_mm = scene.height_mm();
+    options.row_step = 3;
+    const auto every_third = [](const cv::Mat& whole) {
+        cv::Mat kept;
+        for (int row = 0; row < whole.rows; row += 3) kept.push_back(whole.row(row));
+        return kept;
+    };
+    PhotoStack few;
+    few.mask = every_third(scene.stack.mask);
+    few.files = scene.stack.files;
+    for (const cv::Mat3f& image : scene.stack.images) few.images.emplace_back(every_third(image));
+    for (const cv::Mat1b& clipped : scene.stack.clipped) few.clipped.emplace_back(every_third(clipped));
+    const Lights equal = without_intensities(scene.lights);
+    EXPECT_LE(worst_error(estimate_intensities(few, equal, options).lights, scene.lights), 0.005);
 }
 
 TEST(SemiCalibrated, WhatLeavesIntensitiesOpenIsAnError) {

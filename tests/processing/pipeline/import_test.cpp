@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "processing/calibration/intensity.h"
 #include "processing/formats/atomic_file.h"
 #include "processing/formats/exr.h"
 #include "processing/formats/light_files.h"
@@ -10,7 +11,7 @@
 #include "processing/formats/picture.h"
 #include "processing/formats/png.h"
 #include "processing/pipeline/export.h"
-#include "processing/pipeline/stack.h"
+#include "processing/pipeline/session_ball.h"
 #include "processing/pipeline/stages.h"
 #include "tests/processing/pipeline/synthetic_photographs.h"
 #include "tests/support/test_data.h"
@@ -96,6 +97,40 @@ TEST_F(Import, BadPhotographsAreNamed) {
     EXPECT_THAT(error(plain()), HasSubstr("2.png is not a picture"));
 }
 
+TEST_F(Import, AFlatFieldTellsTheLampsIntensities) {
+    Lights lights = test::lamp_ring();
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+        lights[i].file = "frame" + std::to_string(i + 1) + ".png";
+        lights[i].intensity = {1.0 + 0.1 * static_cast<double>(i), 1.0, 1.3 - 0.1 * static_cast<double>(i)};
+        const Eigen::Vector3d plane = 30'000.0 * lights[i].direction.z() * lights[i].intensity;
+        write_png(at("plane") / lights[i].file, cv::Mat(80, 96, CV_16UC3, cv::Scalar(plane.x(), plane.y(), plane.z())));
+    }
+    test::write_photographs(at("photos"), lights);
+    write_lights(at("given.lp"));
+    ImportOptions options = plain();
+    options.lights = at("given.lp");
+    options.flat_images = at("plane");
+    const Session session = import_photographs(options);
+    EXPECT_EQ(session.frames().size(), 2 * lights.size());
+    const Calibration found = run_calibrate(session, {}).calibration;
+    EXPECT_EQ(found.intensity_origin, IntensityOrigin::flat);
+    const Lights expected = with_mean_intensity_one(lights);
+    for (std::size_t i = 0; i < lights.size(); ++i)
+        EXPECT_LE((found.lights[i].intensity - expected[i].intensity).norm(), 1e-3) << lights[i].file;
+}
+
+TEST_F(Import, AFlatFieldNeedsAPhotographForEachLampOfTheSameSize) {
+    write_eight_bit(at("photos/1.png"));
+    write_eight_bit(at("photos/2.png"));
+    write_eight_bit(at("plane/1.png"));
+    ImportOptions options = plain();
+    options.flat_images = at("plane");
+    EXPECT_THAT(error(options), HasSubstr("1 photographs of the flat field"));
+    write_eight_bit(at("plane/1.png"), {6, 5});
+    write_eight_bit(at("plane/2.png"), {6, 5});
+    EXPECT_THAT(error(options), AllOf(HasSubstr("plane/1.png is 6x5"), HasSubstr("photos/1.png is 6x4")));
+}
+
 TEST_F(Import, FoldersWithoutPhotographs) {
     EXPECT_THAT(error(plain()), HasSubstr("photos is not a folder"));
     write_eight_bit(at("photos/mask.png"));
@@ -131,7 +166,7 @@ TEST_F(Import, BallCaptureMustMatchFrameByFrame) {
     EXPECT_EQ(session.frames()[3].file, "frames/ball/b2.png");
     EXPECT_EQ(session.frames()[3].kind, FrameKind::ball);
     EXPECT_THAT(session.extras(), Contains("masks/ball_mask.png"));
-    EXPECT_EQ(load_ball_frames(session).files, (std::vector<std::string>{"1.png", "2.png"}));
+    EXPECT_EQ(SessionBall(session, {}).files(), (std::vector<std::string>{"1.png", "2.png"}));
 }
 
 TEST_F(Import, LightsOfAnotherCountAreRefused) {

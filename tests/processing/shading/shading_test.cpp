@@ -2,11 +2,15 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
 #include <type_traits>
 
 #include "acquisition/frame/error.h"
+#include "processing/shading/shading_bands.h"
 #include "tests/support/textured_sphere.h"
+#include "tests/support/throws.h"
 
 namespace darkbox {
 namespace {
@@ -209,6 +213,105 @@ TEST(ShadingMaps, TakeANearLightAsItReachesThePixel) {
     }
     EXPECT_LT(largest_difference_to_lambert(shade(sphere, options).maps), 1e-6);
     EXPECT_THROW(shade(sphere), InputError);
+}
+
+void expect_same_bits(const ShadingResult& a, const ShadingResult& b) {
+    EXPECT_EQ(cv::norm(a.albedo.albedo, b.albedo.albedo, cv::NORM_INF), 0);
+    EXPECT_EQ(cv::norm(a.maps.radiance, b.maps.radiance, cv::NORM_INF), 0);
+    EXPECT_EQ(cv::norm(a.maps.samples, b.maps.samples, cv::NORM_INF), 0);
+    EXPECT_EQ(cv::norm(a.maps.mean_albedo, b.maps.mean_albedo, cv::NORM_INF), 0);
+}
+
+ShadingResult shade_by_bands(PhotoSource& photos, const TexturedSphere& s, const ShadingBands& bands,
+                             const WorkContext& work = {}) {
+    return shading_maps(photos, s.lights, s.normals, s.albedo, s.index, {}, bands, work);
+}
+
+TEST(ShadingMaps, SameBitsForAnyHeightOfBandsAndAnyNumberOfThreads) {
+    TexturedSphere sphere = textured_sphere(90);
+    add_noise(sphere.stack, 0.02);
+    const ShadingResult whole = shade(sphere);
+    for (const int rows : {1, 7, 89, 90, 1000})
+        for (const int threads : {1, 2, 8}) {
+            WorkContext work;
+            work.threads = threads;
+            ShadingBands bands;
+            bands.rows = rows;
+            PhotosInMemory photos(sphere.stack);
+            expect_same_bits(shade_by_bands(photos, sphere, bands, work), whole);
+        }
+}
+
+/// The sphere as a camera would store it: 8 and 16 bits, some by a curve, some above a dark frame, one floating point.
+std::vector<PhotoRows> as_decoded(const PhotoStack& stack) {
+    auto curve = std::make_shared<std::vector<float>>(256);
+    for (std::size_t i = 0; i < 256; ++i) (*curve)[i] = static_cast<float>(i * i) / 65025.0F;
+    std::vector<PhotoRows> photos;
+    for (std::size_t i = 0; i < stack.images.size(); ++i) {
+        PhotoRows& photo = photos.emplace_back();
+        const bool narrow = i % 3 == 0;
+        if (i % 3 == 2) {
+            photo.samples = stack.images[i];
+            continue;
+        }
+        const double full = narrow ? 255 : 65535;
+        stack.images[i].convertTo(photo.samples, narrow ? CV_8U : CV_16U, full);
+        photo.black = 3;
+        photo.scale = static_cast<float>(1 / full);
+        photo.limit = static_cast<float>(0.5 * full);
+        if (i % 2 == 0 && narrow) photo.curve = curve;
+        if (i % 4 == 1) photo.dark = cv::Mat3f(stack.size(), cv::Vec3f(1.5F, 2.5F, 3.5F));
+    }
+    return photos;
+}
+
+TEST(ShadingMaps, OfPhotographsAsDecodedAreThoseOfTheirRadiance) {
+    TexturedSphere sphere = textured_sphere(60);
+    add_noise(sphere.stack, 0.02);
+    const std::vector<PhotoRows> decoded = as_decoded(sphere.stack);
+    for (std::size_t i = 0; i < decoded.size(); ++i) {
+        sphere.stack.images[i] = radiance_of(decoded[i]);
+        sphere.stack.clipped[i] = clipped_of(decoded[i]);
+    }
+    PhotosInMemory photos(decoded, sphere.stack.files, sphere.stack.mask);
+    ShadingBands bands;
+    bands.rows = 11;
+    expect_same_bits(shade_by_bands(photos, sphere, bands), shade(sphere));
+}
+
+/// Photographs that say what their rows take, and how they were read.
+class CountingPhotos : public PhotosInMemory {
+public:
+    CountingPhotos(const PhotoStack& stack, std::size_t bytes_per_row) : PhotosInMemory(stack), bytes_(bytes_per_row) {}
+    std::size_t bytes_per_row() const override { return bytes_; }
+    void read_next(int rows, PhotoBand& band) override {
+        most_rows = std::max(most_rows, rows);
+        PhotosInMemory::read_next(rows, band);
+    }
+    void rewind() override {
+        ++rewinds;
+        PhotosInMemory::rewind();
+    }
+    int most_rows = 0, rewinds = 0;
+
+private:
+    std::size_t bytes_;
+};
+
+TEST(ShadingMaps, ReadPhotographsOnceWhereTheMemoryHoldsThem) {
+    const TexturedSphere sphere = textured_sphere(90);
+    ShadingBands bands;
+    bands.memory_mib = 100;
+    CountingPhotos few(sphere.stack, std::size_t{1} << 20), many(sphere.stack, std::size_t{2} << 20);
+    const ShadingResult whole = shade_by_bands(few, sphere, bands), banded = shade_by_bands(many, sphere, bands);
+    EXPECT_EQ(few.most_rows, 90);
+    EXPECT_EQ(few.rewinds, 0);
+    EXPECT_LE(2 * 2 * many.most_rows, 100) << "two bands";
+    EXPECT_EQ(many.rewinds, 2);
+    expect_same_bits(whole, banded);
+    bands.memory_mib = 3;
+    EXPECT_THAT(test::input_error_of([&] { shade_by_bands(many, sphere, bands); }),
+                testing::HasSubstr("memory_mib is 3"));
 }
 
 TEST(ShadingMaps, SameBitsOnAnyNumberOfThreads) {

@@ -58,6 +58,7 @@ TEST(FocusCreep, HasATrend) {
     EXPECT_NEAR(trend->percent_per_month, 2.0, 0.01);
     EXPECT_NEAR(trend->left, 1.22, 0.001);
     EXPECT_FALSE(trend_of("rig", {readings.begin(), readings.begin() + 2}));
+    EXPECT_FALSE(trend_of("rig", {{5, 1}, {5, 2}, {5, 3}}));
     EXPECT_EQ(day_of_date("1970-01-11T09:00:00Z"), 10);
     EXPECT_FALSE(day_of_date("yesterday"));
 }

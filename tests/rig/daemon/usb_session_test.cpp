@@ -215,7 +215,7 @@ TEST_F(UsbSession, AKilledDaemonLeavesTheLampsToTheBoard) {
     EXPECT_TRUE(comes_true([&] { return lit() == 0; }, 1500ms)) << "heartbeat 600 ms";
     daemon_->wait();
     start();  // it goes on with the session by itself, and is idle afterwards
-    ASSERT_TRUE(comes_true([&] { return fs::exists(sessions_ / "vase" / "bagit.txt"); }, 20s));
+    ASSERT_TRUE(comes_true([&] { return fs::exists(sessions_ / "vase" / "tagmanifest-sha256.txt"); }, 20s));
     const Session session = Session::open(sessions_ / "vase");
     EXPECT_NO_THROW(session.verify());
     EXPECT_EQ(session.frames().size(), static_cast<std::size_t>(lamp_count + 2));
