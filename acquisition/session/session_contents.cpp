@@ -28,6 +28,7 @@ void SessionContents::apply(const JournalEntry& entry) {
                    [this](const Payload& extra) { add_payload(extra); },
                    [this](const SessionEvent& event) { events.push_back(event); },
                    [this](const NoteEntry& note) { info.notes.push_back(note.note); },
+                   [this](const WithdrawnEntry& withdrawn) { withdraw(withdrawn.file); },
                },
                entry);
 }
@@ -37,6 +38,13 @@ void SessionContents::add_payload(Payload payload) {
         throw InputError(fmt::format("the session holds {} already", shown(payload.name)),
                          "nothing in a session is ever replaced; give the file another name");
     payloads.push_back(std::move(payload));
+}
+
+void SessionContents::withdraw(const std::string& file) {
+    if (std::erase_if(frames, [&](const FrameRecord& record) { return record.file == file; }) == 0)
+        throw InputError(fmt::format("the session has no frame {} to withdraw", shown(file)), "the journal is damaged");
+    std::erase_if(payloads, [&](const Payload& payload) { return payload.name == file; });
+    names.erase(file);
 }
 
 }  // namespace darkbox

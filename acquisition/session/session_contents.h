@@ -25,7 +25,12 @@ struct FrameEntry {
 struct NoteEntry {
     std::string note;
 };
-using JournalEntry = std::variant<FrameEntry, Payload, SessionEvent, NoteEntry>;
+/// The frame of this name is not the session's any more, and the name is free.
+struct WithdrawnEntry {
+    std::string file;
+    std::string why;
+};
+using JournalEntry = std::variant<FrameEntry, Payload, SessionEvent, NoteEntry, WithdrawnEntry>;
 
 /// All that a session holds and says. The writer builds it up entry by entry; resuming replays the journal into it.
 struct SessionContents {
@@ -35,12 +40,13 @@ struct SessionContents {
     std::vector<Payload> payloads;  ///< frames and extras
     std::unordered_set<std::string> names;
 
-    /// Throws InputError when the session has a payload of that name already.
+    /// Throws InputError when the session has a payload of that name already, or has no frame to withdraw.
     void apply(const JournalEntry& entry);
     bool holds(const std::string& name) const { return names.contains(name); }
 
 private:
     void add_payload(Payload payload);
+    void withdraw(const std::string& file);
 };
 
 }  // namespace darkbox

@@ -288,6 +288,7 @@ struct EntryToJson {
     }
     Json operator()(const SessionEvent& event) const { return {{"event", json_of(event)}}; }
     Json operator()(const NoteEntry& entry) const { return {{"note", entry.note}}; }
+    Json operator()(const WithdrawnEntry& entry) const { return {{"withdrawn", entry.file}, {"why", entry.why}}; }
 };
 
 }  // namespace
@@ -328,7 +329,8 @@ JournalEntry parse_journal_line(const std::string& where, std::string_view line)
     if (fields.has("extra")) return extra_from({where, fields.member("extra")});
     if (fields.has("event")) return event_from({where, fields.member("event")});
     if (fields.has("note")) return NoteEntry{fields.text("note")};
-    refuse(where, "neither a frame nor an extra, event or note");
+    if (fields.has("withdrawn")) return WithdrawnEntry{fields.text("withdrawn"), fields.text("why")};
+    refuse(where, "neither a frame nor an extra, event, note or withdrawal");
 }
 
 SessionDocument parse_session_document(const std::string& where, std::string_view text) {

@@ -84,6 +84,15 @@ void put_in_order(std::vector<FrameRecord>& frames, const std::vector<std::strin
     std::ranges::stable_sort(frames, {}, place);
 }
 
+void put_in_doubt(std::vector<FrameRecord>& frames, const std::vector<FrameDoubt>& doubts) {
+    for (const FrameDoubt& doubt : doubts)
+        for (FrameRecord& record : frames)
+            if (record.file == doubt.file) {
+                record.verified = false;
+                record.verification = doubt.words;
+            }
+}
+
 /// Housekeeping after the seal, all of it optional: the bag is complete without.
 void tidy_sealed(const fs::path& folder) {
     for (const std::string& file : files_below(folder / "data")) {
@@ -225,6 +234,17 @@ void SessionWriter::take_over(const fs::path& file, const FrameRecord& record) {
     state_->acknowledge(FrameEntry{record, fs::file_size(target)});
 }
 
+/// The journal first: a file that it does not know is removed by whoever goes on.
+void SessionWriter::withdraw(const std::string& file, const std::string& why) {
+    const auto is_this = [&](const FrameRecord& record) { return record.file == file; };
+    if (std::ranges::none_of(state_->contents.frames, is_this))
+        throw InputError(fmt::format("{} has no frame {}", state_->folder.string(), shown(file)),
+                         "withdraw frames that were acknowledged");
+    state_->acknowledge(WithdrawnEntry{file, why});
+    const fs::path path = state_->folder / "data" / file;
+    if (::unlink(path.c_str()) != 0) throw_errno("unlink", path.string(), errno);
+}
+
 void SessionWriter::add_extra(const std::string& name, std::span<const std::byte> bytes) {
     state_->require_open();
     require_payload_name(state_->folder.string(), name);
@@ -234,7 +254,7 @@ void SessionWriter::add_extra(const std::string& name, std::span<const std::byte
 void SessionWriter::note_event(const std::string& what) { state_->acknowledge(SessionEvent{iso8601_now(), what}); }
 void SessionWriter::add_note(const std::string& note) { state_->acknowledge(NoteEntry{note}); }
 
-Session SessionWriter::seal(const std::vector<std::string>& order) {
+Session SessionWriter::seal(const std::vector<std::string>& order, const std::vector<FrameDoubt>& doubts) {
     state_->require_open();
     const SessionContents& contents = state_->contents;
     const fs::path& folder = state_->folder;
@@ -244,6 +264,7 @@ Session SessionWriter::seal(const std::vector<std::string>& order) {
                          fmt::format("take the missing ones: darkbox capture --resume {}", folder.string()));
     remove_unacknowledged(folder, contents);
     put_in_order(state_->contents.frames, order);
+    put_in_doubt(state_->contents.frames, doubts);
     try {
         write_bag(folder, contents);
     } catch (...) {

@@ -12,6 +12,12 @@
 
 namespace darkbox {
 
+/// Why a frame may not be what its record says.
+struct FrameDoubt {
+    std::string file;   ///< as in FrameRecord::file
+    std::string words;  ///< become its verification
+};
+
 /// Writes a session: append-only, atomic, resumable. A frame is acknowledged when add() returns: its file is flushed
 /// and renamed into place and its journal line is flushed, so it survives SIGKILL and power loss.
 /// One writer at a time holds a session (a lock file). Thread-compatible.
@@ -43,6 +49,9 @@ public:
     /// A frame of a sealed session, `file`, under the same record: linked where the disk allows it, else copied. Throws
     /// InputError when the file is not what the record's checksum says.
     void take_over(const std::filesystem::path& file, const FrameRecord& record);
+    /// Gives an acknowledged frame up again: the session never had it, and may take another of that name. Throws
+    /// InputError when it has none of that name.
+    void withdraw(const std::string& file, const std::string& why);
     /// Any other payload: masks, given lights, rig.toml. `name` is relative to data/, without "..".
     void add_extra(const std::string& name, std::span<const std::byte> bytes);
     void note_event(const std::string& what);
@@ -50,8 +59,8 @@ public:
 
     /// Writes session.json and the BagIt manifests, flushes, removes the journal. The session is read-only afterwards.
     /// `order`: names of frames in the order in which the manifest is to have them; others come after, as acknowledged.
-    /// Throws InputError when fewer frames are there than planned.
-    Session seal(const std::vector<std::string>& order = {});
+    /// `doubts`: frames that are not verified after all. Throws InputError when fewer frames are there than planned.
+    Session seal(const std::vector<std::string>& order = {}, const std::vector<FrameDoubt>& doubts = {});
 
 private:
     struct State;

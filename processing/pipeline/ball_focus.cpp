@@ -3,7 +3,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "acquisition/frame/error.h"
-#include "processing/calibration/sharpness.h"
+#include "processing/calibration/reblur.h"
 #include "processing/formats/json_file.h"
 #include "processing/pipeline/session_files.h"
 
@@ -38,7 +38,7 @@ std::optional<double> ball_blur_px(BallPhotographs& photographs, const std::vect
                 if (pixel[0] > unclipped || pixel[1] > unclipped || pixel[2] > unclipped) good(v, u) = 0;
             }
     }
-    return measure_blur(mean, good, fewest_edges);
+    return edge_width_px(mean, good, fewest_edges);
 }
 
 std::optional<double> stored_blur_px(const std::filesystem::path& session) {

@@ -8,7 +8,7 @@
 
 namespace darkbox {
 
-/// How sharp the first ball is, by measure_blur() over what is seen around and in it, in the mean of all frames,
+/// How sharp the first ball is, by edge_width_px() over what is seen around and in it, in the mean of all frames,
 /// without what any of them clips. A ball in its place shows the same edges in every recalibration, so that a focus
 /// that creeps shows. No value where the ball is too small or too dark to tell.
 std::optional<double> ball_blur_px(BallPhotographs& photographs, const std::vector<Ball>& balls);

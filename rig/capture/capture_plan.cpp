@@ -51,7 +51,7 @@ class PlanMaker {
 public:
     explicit PlanMaker(const RigDescription& rig) : rig_(rig) {}
 
-    void add_part(Seconds exposure, const std::vector<LampId>& lamps) {
+    void add_part(Seconds exposure, const std::vector<LampId>& lamps, bool closes) {
         camera_ = {exposure, rig_.camera.gain};
         const auto every = static_cast<std::size_t>(rig_.capture.dark_every);
         const std::size_t frames = lamps.size() * static_cast<std::size_t>(rig_.capture.averages);
@@ -60,6 +60,7 @@ public:
             if (every > 0 && lit > 0 && lit % every == 0) add(std::nullopt);
             add(lamps[lit % lamps.size()]);
         }
+        if (closes && rig_.capture.closing_repeat) add(lamps.front());
         add(std::nullopt);
     }
     CapturePlan take() { return std::move(plan_); }
@@ -92,10 +93,11 @@ std::vector<LampId> lamps_named(const RigDescription& rig, const std::vector<std
 CapturePlan plan_capture(const RigDescription& rig, const std::vector<std::string>& names) {
     const std::vector<LampId> lamps = lamps_named(rig, names);
     PlanMaker maker(rig);
-    for (const double factor : rig.capture.brackets) {
-        const Seconds exposure = factor * rig.camera.exposure;
+    const std::vector<double>& brackets = rig.capture.brackets;
+    for (std::size_t i = 0; i < brackets.size(); ++i) {
+        const Seconds exposure = brackets[i] * rig.camera.exposure;
         check_exposure(exposure, rig, lamps);
-        maker.add_part(exposure, lamps);
+        maker.add_part(exposure, lamps, i + 1 == brackets.size());
     }
     return maker.take();
 }

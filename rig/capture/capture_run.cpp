@@ -1,9 +1,10 @@
 #include "rig/capture/capture_run.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
-#include <filesystem>
+#include <set>
 
 #include "acquisition/device/device_error.h"
 #include "rig/capture/predictive_shots.h"
@@ -33,7 +34,7 @@ std::vector<std::span<const Shot>> parts_of(const CapturePlan& plan) {
 
 std::int64_t nanoseconds(TimePoint moment) { return moment.time_since_epoch().count(); }
 
-/// A closing dark frame that differed leaves the frames before it in doubt for good.
+/// Sessions of before frames were withdrawn hold those of which nobody knows what lit them.
 void refuse_doubtful(const FrameSink& sink) {
     for (const FrameRecord& record : sink.kept())
         if (!record.verified)
@@ -106,7 +107,13 @@ public:
                 resumed_ = true;
             } else {
                 prepare(*shot);
-                take_settled(*shot);
+                dark_differed_ = false;
+                TakenShot taken = take_or_withdraw(*shot);
+                if (dark_differed_ && withdraw_before(*shot)) {
+                    shot = after_last_dark(*shot);
+                    continue;
+                }
+                add(*shot, std::move(taken));
             }
             ++shot;
         }
@@ -123,9 +130,10 @@ private:
 
     bool is_kept(const Shot& shot) const {
         const auto& records = sink_.kept();
-        return std::any_of(records.begin(), records.end(), [&](const FrameRecord& record) {
-            return record.file == file_of(shot) && record.kind == shot.kind && record.lamp == shot.lamp;
-        });
+        return !withdrawn_.contains(file_of(shot)) &&
+               std::any_of(records.begin(), records.end(), [&](const FrameRecord& record) {
+                   return record.file == file_of(shot) && record.kind == shot.kind && record.lamp == shot.lamp;
+               });
     }
 
     /// The lit shots from here on that can be taken without a stop; none in settled mode.
@@ -159,7 +167,52 @@ private:
         for (const Shot& shot : left.shots) {
             if (!left.stay_settled) ++summary_.repeated;
             prepare(shot);
-            take_settled(shot);
+            add(shot, take(shot));
+        }
+    }
+
+    /// The first shot since the last frame without a lamp before this one.
+    std::span<const Shot>::iterator after_last_dark(const Shot& shot) const {
+        auto first = shots_.begin() + (&shot - shots_.data());
+        while (first != shots_.begin() && (first - 1)->lamp) --first;
+        return first;
+    }
+
+    /// Gives up all frames since the last good frame without a lamp: nobody knows when the light came in. False: there
+    /// are none, as before the first one.
+    bool withdraw_before(const Shot& dark) {
+        std::vector<std::string> names;
+        for (auto shot = after_last_dark(dark); &*shot != &dark; ++shot) {
+            if (!taken_.contains(file_of(*shot)) && !is_kept(*shot)) continue;
+            sink_.withdraw(file_of(*shot), fmt::format("{} differed after it", dark.name));
+            taken_.erase(file_of(*shot)) > 0 ? --summary_.taken : --summary_.resumed;
+            withdrawn_.insert(file_of(*shot));
+            ++summary_.repeated;
+            names.push_back(lamp(*shot).name);
+        }
+        if (names.empty()) return false;
+        sink_.note_event(
+            fmt::format("{}: it differed from the first one, so that the {} frames before it are in doubt "
+                        "and taken again: {}",
+                        dark.name, names.size(), fmt::join(names, ", ")));
+        if (++withdrawals_ >= rig_.capture.tries)
+            throw DarkDiffers(
+                fmt::format("frame {}: light came into the box {} times while lamps were lit", dark.name, withdrawals_),
+                "look for a door that does not close and for a lamp with a loose contact; what is in "
+                "doubt was withdrawn, and is taken again when the session is resumed");
+        return true;
+    }
+
+    /// When a frame without a lamp goes on differing, those before it are not left in the session.
+    TakenShot take_or_withdraw(const Shot& shot) {
+        try {
+            return take(shot);
+        } catch (const DarkDiffers& error) {
+            if (withdraw_before(shot))
+                throw DarkDiffers(error.what(), error.hint() +
+                                                    "; the frames in doubt were withdrawn, and are taken "
+                                                    "again when the session is resumed");
+            throw;
         }
     }
 
@@ -202,23 +255,10 @@ private:
                          "connect the camera that the session was begun with, or capture a new session");
     }
 
-    /// A closing dark frame that goes on differing is kept as well: it shows what went wrong.
-    void take_settled(const Shot& shot) {
-        try {
-            add(shot, take(shot));
-        } catch (const DarkDiffers& error) {
-            if (auto differing = settled_.take_refused()) {
-                differing->words = error.what();
-                add(shot, std::move(*differing), Verified::no);
-            }
-            if (plan_.closing_dark_differs_is_error) throw;
-        }
-    }
-
-    enum class Verified { no, yes };
-    void add(const Shot& shot, TakenShot taken, Verified verified = Verified::yes) {
+    void add(const Shot& shot, TakenShot taken) {
         FrameRecord record = record_of(shot, taken);
-        record.verified = verified == Verified::yes;
+        record.verified = true;
+        taken_.insert(record.file);
         sink_.add(std::move(taken.frame), std::move(record));
         ++summary_.taken;
     }
@@ -254,6 +294,7 @@ private:
             } catch (const DeviceError& error) {
                 reject(shot, number, error);
             } catch (const DarkDiffers& error) {
+                dark_differed_ = dark_differed_ || !error.late();
                 reject(shot, number, error);
                 settled_.distrust_timestamps();
             } catch (const InputError& error) {
@@ -292,7 +333,11 @@ private:
     SettledShots settled_;
     SyncMode mode_ = rig_.capture.mode;  ///< at present
     bool resumed_ = false;               ///< some of these shots were kept by an earlier run
-    CaptureSummary& summary_;            ///< of the whole plan
+    std::set<std::string> taken_;        ///< files of this run
+    std::set<std::string> withdrawn_;    ///< files that an earlier run kept, and this one does not
+    bool dark_differed_ = false;         ///< the frame without a lamp that is being taken, for a moment
+    int withdrawals_ = 0;
+    CaptureSummary& summary_;  ///< of the whole plan
 };
 
 }  // namespace
@@ -300,7 +345,7 @@ private:
 CaptureSummary run_capture(const CapturePlan& plan, const RigDescription& rig, const CaptureDevices& devices,
                            FrameSink& sink, const WorkContext& work, const TimingLookup& timings) {
     validate(plan, rig, devices.lamps);
-    if (plan.closing_dark_differs_is_error) refuse_doubtful(sink);
+    refuse_doubtful(sink);
     devices.lamps.dark();
     CaptureSummary summary;
     for (const std::span<const Shot> shots : parts_of(plan))

@@ -263,7 +263,12 @@ CapturedSession capture_session(const CaptureRequest& request, const RigDescript
         summary = take_shots(begun, rig, devices, told, work, timings);
         recorder.finish();
     }
-    return {begun.writer.seal(begun.order), summary};
+    const SessionReview review = request.review ? request.review(begun.writer) : SessionReview{};
+    for (const std::string& finding : review.findings) {
+        begun.writer.note_event(finding);
+        if (request.listener.event) request.listener.event(finding);
+    }
+    return {begun.writer.seal(begun.order, review.doubts), summary, review.findings};
 }
 
 }  // namespace darkbox

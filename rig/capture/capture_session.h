@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "rig/capture/capture_run.h"
+#include "rig/capture/session_review.h"
 #include "rig/capture/told_sink.h"
 
 namespace darkbox {
@@ -31,12 +32,14 @@ struct CaptureRequest {
     std::optional<std::filesystem::path> retake = {};
     ObjectRecord record = {};  ///< of the object; a resumed session keeps its own
     CaptureListener listener = {};
+    ReviewSession review = {};  ///< of the whole session before it is sealed; empty: none
     std::vector<std::string> notes = {};  ///< what the session is to keep of how it began
 };
 
 struct CapturedSession {
     Session session;  ///< sealed
     CaptureSummary summary;
+    std::vector<std::string> findings;  ///< of the review, also among the session's events
 };
 
 /// What the rig's description knows of the geometry, for the session.

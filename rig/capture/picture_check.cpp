@@ -74,7 +74,7 @@ std::string PictureCheck::accept_dark(const Frame& frame) {
         throw DarkDiffers(fmt::format("the dark frame differs from the first one by {:+.4f} of full scale, at most "
                                       "{:.4f} is allowed{}",
                                       change, min_signal_, likely_stuck_lamp(picture)),
-                          "look for a lamp that is stuck on or a door that was opened, then capture a new session");
+                          "look for a lamp that is stuck on or a door that was opened", is_the_last_lamp(picture));
     return fmt::format("mean {:.4f} of full scale above the black level, {:+.4f} against the first dark frame",
                        above_black, change);
 }
@@ -171,6 +171,11 @@ std::string PictureCheck::check_not_another_lamp(const std::string& lamp, const 
                             std::sqrt(std::max(difference.pixels.value, difference.blocks.value)));
     }
     return found;
+}
+
+bool PictureCheck::is_the_last_lamp(const Picture& dark) const {
+    return noise_ && !recent_.empty() &&
+           same_light(compare(dark, recent_.back().picture, *dark_, *noise_), same_picture);
 }
 
 std::string PictureCheck::likely_stuck_lamp(const Picture& dark) const {

@@ -18,7 +18,13 @@ namespace darkbox {
 /// A dark frame is not as dark as the first one: light that no shot asked for came into the box in between.
 class DarkDiffers : public InputError {
 public:
-    using InputError::InputError;
+    DarkDiffers(const std::string& what, const std::string& hint, bool late = false)
+        : InputError(what, hint), late_(late) {}
+    /// It is the picture of the last lamp, which burnt a moment ago: a frame from before, and no light to wonder at.
+    bool late() const { return late_; }
+
+private:
+    bool late_;
 };
 
 /// Proves by the picture alone which lamp lit a frame: timestamps can lie, the picture cannot. Every accept function
@@ -62,6 +68,7 @@ private:
                      const NoiseModel& noise) const;
     std::string check_not_another_lamp(const std::string& lamp, const Picture& picture, const NoiseModel& noise) const;
     std::string likely_stuck_lamp(const Picture& dark) const;
+    bool is_the_last_lamp(const Picture& dark) const;
 
     double full_scale_;
     double black_level_;

@@ -49,6 +49,12 @@ void SessionRecorder::add(Frame frame, FrameRecord record) {
     push(lock, Picture{std::move(frame), std::move(record)});
 }
 
+void SessionRecorder::withdraw(const std::string& file, const std::string& why) {
+    const std::unique_lock lock(mutex_);
+    entries_.emplace_back(Withdrawal{file, why});
+    changed_.notify_all();
+}
+
 /// Notes that something went wrong must not hide what it was.
 void SessionRecorder::note_event(const std::string& what) {
     const std::unique_lock lock(mutex_);
@@ -86,6 +92,8 @@ void SessionRecorder::write(std::stop_token stop) {
 void SessionRecorder::write_one(Entry entry) {
     if (auto* picture = std::get_if<Picture>(&entry))
         writer_.add(picture->frame, std::move(picture->record));
+    else if (const auto* withdrawal = std::get_if<Withdrawal>(&entry))
+        writer_.withdraw(withdrawal->file, withdrawal->why);
     else
         writer_.note_event(std::get<std::string>(entry));
 }

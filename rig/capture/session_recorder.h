@@ -33,6 +33,7 @@ public:
     const std::vector<FrameRecord>& kept() const override { return kept_; }
     Frame read(const FrameRecord& record) const override;
     void add(Frame frame, FrameRecord record) override;
+    void withdraw(const std::string& file, const std::string& why) override;
     void note_event(const std::string& what) override;
     bool has_room() const override;
 
@@ -46,7 +47,10 @@ private:
         Frame frame;
         FrameRecord record;
     };
-    using Entry = std::variant<Picture, std::string>;
+    struct Withdrawal {
+        std::string file, why;
+    };
+    using Entry = std::variant<Picture, Withdrawal, std::string>;
 
     static std::size_t bytes_of(const Entry& entry);
     bool fits(std::size_t bytes) const { return queued_ == 0 || queued_ + bytes <= limits_.queued_bytes; }

@@ -19,19 +19,13 @@ double share_of(Nanoseconds part, Seconds whole) { return to_seconds(part) / who
 }  // namespace
 
 TakenShot SettledShots::take(const Shot& shot) {
-    refused_.reset();
     switch_to(shot);
     const TimePoint steady = std::max(on_, lamps_.timeline().steady_from()) + margin_;
     const TimePoint deadline = deadline_of(shot, steady);
     TakenShot taken{first_after(steady, shot, deadline), on_, on_, ""};
-    try {
-        const double after = to_seconds(taken.frame.exposure.begin - taken.on);
-        taken.words = fmt::format("exposed {:.1f} ms after the switch, within the steady time; {}", after * 1000.0,
-                                  accept(shot, taken.frame, deadline));
-    } catch (const InputError&) {
-        refused_ = std::move(taken);
-        throw;
-    }
+    const double after = to_seconds(taken.frame.exposure.begin - taken.on);
+    taken.words = fmt::format("exposed {:.1f} ms after the switch, within the steady time; {}", after * 1000.0,
+                              accept(shot, taken.frame, deadline));
     taken.off = clock_.now();
     lamps_.dark();
     if (shot.lamp) last_lamp_ = shot.lamp;

@@ -22,9 +22,6 @@ public:
     /// One try. The lamps are dark when it returns. Throws DeviceError, InputError, Cancelled.
     TakenShot take(const Shot& shot);
 
-    /// The picture that the latest take() refused, if it came as far as that.
-    std::optional<TakenShot> take_refused() { return std::exchange(refused_, std::nullopt); }
-
     /// A picture contradicted its timestamps: from here on every wait after a switch is as long as the camera can hold
     /// pictures back. Anything shorter could end just where a lie is hardest to see.
     void distrust_timestamps();
@@ -54,7 +51,6 @@ private:
     Clock& clock_;
     std::optional<LampId> last_lamp_;  ///< of the latest proven shot that was lit
     TimePoint on_;
-    std::optional<TakenShot> refused_;
     int known_repeats_ = 0;
     Nanoseconds margin_{0};  ///< waited besides the settle time, since pictures came later than their timestamps
 };

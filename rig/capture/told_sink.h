@@ -27,6 +27,7 @@ public:
         sink_.add(std::move(frame), std::move(record));
         if (listener_.frame) listener_.frame(told);
     }
+    void withdraw(const std::string& file, const std::string& why) override { sink_.withdraw(file, why); }
     void note_event(const std::string& what) override {
         sink_.note_event(what);
         if (listener_.event) listener_.event(what);

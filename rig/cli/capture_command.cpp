@@ -53,10 +53,12 @@ std::optional<ExposureChoice> exposure_of(const std::string& text) {
     return ExposureChoice{Seconds(us / 1e6)};
 }
 
-CommandResult captured(const std::string& folder, std::size_t frames, int repeated, int resumed, double seconds) {
+CommandResult captured(const std::string& folder, std::size_t frames, int repeated, int resumed, double seconds,
+                       const std::vector<std::string>& findings) {
     CommandResult result;
-    result.json = {
-        {"session", folder}, {"frames", frames}, {"repeated", repeated}, {"resumed", resumed}, {"seconds", seconds}};
+    result.json = {{"session", folder},  {"frames", frames},   {"repeated", repeated},
+                   {"resumed", resumed}, {"seconds", seconds}, {"findings", findings}};
+    result.warnings = findings;
     result.text =
         fmt::format("{}: {} frames, sealed, in {:.1f} s. Next: darkbox process {}", folder, frames, seconds, folder);
     if (repeated > 0) result.warnings.push_back(fmt::format("{} exposures had to be repeated", repeated));
@@ -109,7 +111,7 @@ CommandResult capture_here(const CaptureArguments& a, const WorkContext& work) {
     const auto rig = hardware.open();
     try {
         const CaptureOutcome o = rig->capture(request, work);
-        return captured(o.session.string(), o.frames, o.repeated, o.resumed, o.duration.count());
+        return captured(o.session.string(), o.frames, o.repeated, o.resumed, o.duration.count(), o.findings);
     } catch (const Cancelled& cancelled) {
         rig->dark();  // said below only because this did not throw
         throw Cancelled(std::string(cancelled.what()) + "; the lamps are dark", way_on(request.folder, ""));
@@ -150,7 +152,8 @@ CommandResult capture_through(const DaemonClient& client, const CaptureArguments
     const EventJson job = client.call("POST", "captures", to_json(order_for(a, client)));
     const EventJson end = FollowedJob(client, job, work, resume_after(job)).end();
     if (end.at("event") == "done")
-        return captured(end.at("folder"), end.at("frames"), end.at("repeated"), end.at("resumed"), end.at("seconds"));
+        return captured(end.at("folder"), end.at("frames"), end.at("repeated"), end.at("resumed"), end.at("seconds"),
+                        end.value("findings", std::vector<std::string>()));
     throw_end(end);
 }
 

@@ -18,6 +18,7 @@ struct CaptureOutcome {
     int resumed = 0;   ///< shots that an earlier run had acknowledged
     int repeated = 0;  ///< exposures thrown away and taken again
     Seconds duration{0};
+    std::vector<std::string> findings = {};  ///< what looks wrong with the rig, in words
 };
 
 /// A rig with its devices open, reduced to what drives it: the daemon's capture thread, or `darkbox capture

@@ -11,6 +11,7 @@
 #include "rig/capture/interlock.h"
 #include "rig/capture/timing_store.h"
 #include "rig/daemon/readiness.h"
+#include "rig/health/frame_review.h"
 #include "rig/lamps/gpio_lamps.h"
 #include "rig/lamps/usb_lamps.h"
 #include "sim/sim_rig.h"
@@ -49,11 +50,15 @@ CaptureOutcome capture_with(const CaptureDevices& devices, Door* door, CaptureRe
     CaptureOutcome outcome;
     drive(devices, door, [&](const CaptureDevices& d) {
         readiness.require(rig, d, request, work);
-        const auto [session, summary] = capture_session(request, rig, d.lamps, d.camera, d.clock, work, measured);
+        CaptureRequest reviewed = request;
+        reviewed.review = [&rig](const SessionWriter& frames) { return review_frames(frames, rig); };
+        const auto [session, summary, findings] =
+            capture_session(reviewed, rig, d.lamps, d.camera, d.clock, work, measured);
         outcome = {.session = session.folder(),
                    .frames = session.frames().size(),
                    .resumed = summary.resumed,
-                   .repeated = summary.repeated};
+                   .repeated = summary.repeated,
+                   .findings = findings};
         readiness.used(d.clock.now());
     });
     outcome.duration = Stopwatch::now() - start;

@@ -37,6 +37,7 @@ void add_outcome(const Job& job, nlohmann::json& json) {
     json["resumed"] = job.outcome.resumed;
     json["repeated"] = job.outcome.repeated;
     json["seconds"] = job.outcome.duration.count();
+    json["findings"] = job.outcome.findings;
 }
 
 }  // namespace

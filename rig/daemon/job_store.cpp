@@ -19,6 +19,7 @@ std::string outcome_text(const Job& job) {
                  {"resumed", job.outcome.resumed},
                  {"repeated", job.outcome.repeated},
                  {"seconds", job.outcome.duration.count()},
+                 {"findings", job.outcome.findings},
                  {"result", job.result},
                  {"detail", job.failure.what},
                  {"hint", job.failure.hint},
@@ -35,7 +36,8 @@ void read_outcome(const std::string& outcome, Job& job) {
                    .frames = json.value("frames", std::size_t{0}),
                    .resumed = json.value("resumed", 0),
                    .repeated = json.value("repeated", 0),
-                   .duration = Seconds(json.value("seconds", 0.0))};
+                   .duration = Seconds(json.value("seconds", 0.0)),
+                   .findings = json.value("findings", std::vector<std::string>())};
     job.result = json.value("result", Json());
     job.failure = {.what = json.value("detail", ""), .hint = json.value("hint", "")};
     job.progress = {.stage = json.value("stage", ""),

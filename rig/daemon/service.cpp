@@ -172,7 +172,7 @@ Job Service::enqueue(Job job) {
     if (stopping_) throw Refused("darkboxd is shutting down", "start it again");
     if (lane_of(job.kind) == Lane::rig) {
         if (job.kind == JobKind::recalibrate && !job.orders.contains("object") && !job.orders.contains("resume"))
-            job.orders["object"] = "recalibration";
+            job.orders["object"] = recalibration_object;
         (void)request_for(capture_order_from(job.orders), 1);
     } else if (!options_.run_processing) {
         throw Refused("this darkboxd does not process", "process with the command: darkbox process SESSION");

@@ -31,7 +31,7 @@ std::vector<double> read_brackets(TomlSection& section) {
 CaptureDescription read_capture(TomlSection& section) {
     CaptureDescription capture;
     section.allow({"mode", "exposure", "ambient", "dark_every", "averages", "brackets", "frame_deadline_s", "tries",
-                   "min_signal", "max_dark"});
+                   "min_signal", "max_dark", "lamp_places", "closing_repeat"});
     capture.mode = *sync_mode_from_name(
         section.choice("mode", std::string(name(capture.mode)), {"settled", "predictive", "strobed"}));
     capture.metered = section.choice("exposure", "fixed", {"fixed", "metered"}) == "metered";
@@ -44,6 +44,8 @@ CaptureDescription read_capture(TomlSection& section) {
     capture.tries = static_cast<int>(section.integer("tries", {1, 100}).value_or(capture.tries));
     capture.min_signal = section.number("min_signal", {0.0001, 0.5}).value_or(capture.min_signal);
     capture.max_dark = section.number("max_dark", {0, 0.5}).value_or(capture.max_dark);
+    capture.closing_repeat = section.flag("closing_repeat").value_or(capture.closing_repeat);
+    capture.lamp_places = section.flag("lamp_places").value_or(capture.lamp_places);
     return capture;
 }
 

@@ -101,9 +101,11 @@ struct CaptureDescription {
     int dark_every = 0;    ///< lit frames after which one without a lamp comes; 0: at both ends only
     int averages = 1;      ///< frames of every lamp at every exposure
     std::vector<double> brackets{1.0};  ///< exposures of every lamp, as multiples of the one exposure
+    bool closing_repeat = false;        ///< the first lamp once more at the end: shows what moved
     Seconds frame_deadline{5.0};        ///< the longest wait for one frame
     int tries = 3;                      ///< per shot, before the session fails
     double min_signal = 0.002;          ///< a lit frame's mean must exceed the dark frame's by this share of full scale
+    bool lamp_places = true;            ///< the mirror ball is to show every lamp where it is known to stand
     double max_dark = 0.01;             ///< a dark frame's mean may exceed the black level by this share of full scale
 };
 

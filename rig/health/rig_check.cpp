@@ -8,11 +8,12 @@
 
 #include "acquisition/frame/error.h"
 #include "processing/calibration/ball_search.h"
-#include "processing/calibration/sharpness.h"
 #include "rig/health/flicker.h"
 #include "rig/health/lamp_spots.h"
 #include "rig/health/linearity.h"
+#include "rig/health/movement.h"
 #include "rig/health/probe.h"
+#include "rig/health/sharpness.h"
 
 namespace darkbox {
 namespace {
@@ -52,6 +53,7 @@ public:
         tell("exposures");
         tell_linearity();
         tell_focus();
+        tell_movement();
         return std::move(report_);
     }
 
@@ -88,6 +90,10 @@ private:
                  "it is dead: its frame is no brighter than the dark one",
                  "check its wiring and its output in rig.toml"});
             return;
+        }
+        if (!first_lamp_) {
+            first_lamp_ = LampId{lamp};
+            first_ = look;
         }
         tell_flicker(lamp, look.flicker);
         if (best_.empty() || signal > best_signal_) {
@@ -289,6 +295,32 @@ private:
         add(finding);
     }
 
+    /// The first lamp's light once more, at the end of all that was done.
+    void tell_movement() {
+        RigFinding finding{"movement", "", std::nullopt, options_.most_movement_px, "px"};
+        finding.verdict = RigVerdict::untold;
+        finding.words = "no lamp shows anything to tell it by";
+        if (!first_lamp_) return add(finding);
+        const LampLook last = look_at(first_lamp_);
+        std::vector<Ball> balls = balls_;
+        for (Ball& ball : balls) {
+            ball.x *= shrink_factor();
+            ball.y *= shrink_factor();
+            ball.radius *= shrink_factor();
+        }
+        const auto movement =
+            measure_movement(first_.mean, last.mean, cv::Mat1b(~(first_.clipped | last.clipped)), balls);
+        finding.words = "too little in the picture has an edge";
+        if (!movement) return add(finding);
+        finding.value = movement->object.length();
+        finding.words = movement->words() + ", from the first frame to the last";
+        finding.remedy = "look for what is loose: object, camera, tripod, table; let it come to rest";
+        const bool failed = movement->moved(options_.most_movement_px);
+        const bool noisy = 3 * movement->object.sigma_px > options_.most_movement_px;
+        finding.verdict = failed ? RigVerdict::failed : noisy ? RigVerdict::untold : RigVerdict::good;
+        add(finding);
+    }
+
     void add(RigFinding finding) { report_.findings.push_back(std::move(finding)); }
 
     const RigDescription& rig_;
@@ -300,8 +332,10 @@ private:
     std::vector<BallLook> ball_looks_;
     std::vector<cv::Mat1b> clipped_;
     std::vector<std::size_t> dead_;
-    std::vector<Ball> balls_;  ///< in shrunken pictures
-    cv::Mat1f best_;           ///< under the lamp that lights most
+    std::vector<Ball> balls_;           ///< in shrunken pictures
+    std::optional<LampId> first_lamp_;  ///< that is not dead
+    LampLook first_;
+    cv::Mat1f best_;  ///< under the lamp that lights most
     LampId best_lamp_;
     double best_signal_ = 0;
     RigReport report_;
@@ -321,6 +355,7 @@ void RigCheckOptions::validate() const {
                                        std::pair{"least_lamp", least_lamp}, std::pair{"most_clipped", most_clipped}})
         require(value > 0 && value < 1, field, value, "above 0, below 1");
     require(most_blur_px > 0, "most_blur_px", most_blur_px, "above 0");
+    require(most_movement_px > 0, "most_movement_px", most_movement_px, "above 0");
 }
 
 RigReport check_rig(const RigDescription& rig, const CaptureDevices& devices, const RigCheckOptions& options,

@@ -14,7 +14,7 @@ enum class RigVerdict {
 
 /// One thing that was measured.
 struct RigFinding {
-    std::string what;             ///< "linearity", "flicker", "leak", "focus", "clipping", "lamp"
+    std::string what;             ///< "linearity", "flicker", "leak", "focus", "clipping", "movement", "lamp"
     std::string where = {};       ///< the lamp's name; empty: the rig
     std::optional<double> value;  ///< as measured, in `unit`
     std::optional<double> limit;  ///< that decides

@@ -222,14 +222,43 @@ TEST(LampFaults, ALampThatSticksIsNamedByTheClosingDarkFrame) {
                                                  HasSubstr("it looks lit by lamp 'lamp-02'")));
 }
 
-TEST(LampFaults, ASessionWithADoubtfulClosingDarkIsNotResumed) {
+TEST(LampFaults, WhatADarkFramePutInDoubtIsTakenAgainOnResume) {
     Bench bench;
     int lit = 0;
     bench.lamps.hook = [&](const std::string& call) {
         if (call == "light" && ++lit == 4) bench.lamps.stuck = {1, bench.clock.now()};
     };
     bench.error<InputError>();
+    {
+        const SessionWriter left = SessionWriter::resume(bench.request().folder);
+        ASSERT_EQ(left.acknowledged().size(), 1U) << "the first dark frame alone is beyond doubt";
+    }
     bench.lamps.stuck.reset();
+    const Session session = bench.capture(CaptureStart::resume);
+    test::expect_every_frame_right(session, bench.rig);
+    EXPECT_EQ(lit, 8);
+    EXPECT_THAT(test::events_of(session),
+                HasSubstr("0005_dark: it differed from the first one, so that the 4 frames before it are in doubt and "
+                          "taken again: lamp-01, lamp-02, lamp-03, lamp-04"));
+}
+
+/// As an earlier darkbox left it.
+TEST(LampFaults, ASessionWithAFrameThatWasNotVerifiedIsNotResumed) {
+    Bench bench;
+    int lit = 0;
+    bench.lamps.hook = [&](const std::string& call) {
+        if (call == "light" && ++lit == 3) bench.stop.request_stop();
+    };
+    bench.error<Cancelled>();
+    bench.stop = std::stop_source();
+    {
+        SessionWriter left = SessionWriter::resume(bench.request().folder);
+        FrameRecord record = left.acknowledged().back();
+        record.file = "frames/0005_dark.tif";
+        record.verification = "it differed";
+        record.verified = false;
+        left.take_over(left.folder() / "data" / left.acknowledged().back().file, record);
+    }
     EXPECT_THAT(bench.error<InputError>(CaptureStart::resume), HasSubstr("cannot be resumed: frame frames/0005_dark"));
 }
 

@@ -96,5 +96,13 @@ TEST_F(CapturePlanTest, ExposuresAreWholePeriodsOfTheFlicker) {
     }
 }
 
+TEST_F(CapturePlanTest, EndsWithTheFirstLampWhereAskedFor) {
+    rig.capture.closing_repeat = true;
+    rig.capture.brackets = {1, 0.25};
+    EXPECT_THAT(names(plan_capture(rig, {"lamp-02", "lamp-04"})),
+                testing::ElementsAre("0000_dark", "0001_lamp-02", "0002_lamp-04", "0003_dark", "0004_dark",
+                                     "0005_lamp-02", "0006_lamp-04", "0007_lamp-02", "0008_dark"));
+}
+
 }  // namespace
 }  // namespace darkbox

@@ -99,7 +99,7 @@ TEST(CaptureSession, ResumeTakesOnlyWhatIsMissing) {
     std::vector<std::string> taken;
     WorkContext work;
     work.report = [&](const ProgressUpdate& update) { taken.push_back(update.detail); };
-    const auto [session, summary] =
+    const auto [session, summary, findings] =
         capture_session(bench.request(CaptureStart::resume), bench.rig, bench.lamps, bench.camera, bench.clock, work);
     EXPECT_EQ(summary.resumed, 3);
     EXPECT_EQ(summary.taken, 3);

@@ -101,7 +101,7 @@ std::string events_of(const Session& session) {
 }
 
 TEST_F(V4l2Capture, ASealedSessionOfTheSensorsOwnSamples) {
-    const auto [session, summary] = capture();
+    const auto [session, summary, findings] = capture();
     EXPECT_EQ(session.frames().size(), 4u);
     EXPECT_EQ(summary.repeated, 0) << events_of(session);
     EXPECT_EQ(session.frames().front().format, "grbg16");
@@ -125,7 +125,7 @@ TEST_F(V4l2Capture, UnpluggedWhileItStreamsTheShotIsRepeatedAndTheSessionSaysSo)
         EXPECT_FALSE(lamps.lit) << "a lost camera is waited for in the dark";
         kernel.plug_in();
     };
-    const auto [session, summary] = capture();
+    const auto [session, summary, findings] = capture();
     EXPECT_EQ(session.frames().size(), 4u);
     EXPECT_GE(summary.repeated, 1);
     EXPECT_THAT(events_of(session), testing::HasSubstr("was unplugged"));
@@ -141,7 +141,7 @@ TEST_F(V4l2Capture, DamagedAndShortFramesAreTakenAgain) {
         if (frames == 8) frame.bytes.resize(10);
         if (frames == 12) frame.error = EIO;
     };
-    const auto [session, summary] = capture();
+    const auto [session, summary, findings] = capture();
     EXPECT_EQ(session.frames().size(), 4u);
     EXPECT_GE(summary.repeated, 1) << events_of(session);
     session.verify();

@@ -59,6 +59,25 @@ TEST_F(CaptureCommand, MetersAndSaysSo) {
     EXPECT_DOUBLE_EQ(Session::open(again_).frames().front().exposure_s, 0.0075);
 }
 
+TEST_F(CaptureCommand, NamesLampsThatAreExchanged) {
+    std::string toml = test::small_rig(6);
+    toml.replace(toml.find("[sim]\n"), 6, "[sim]\nfaults = \"swapped-lamps@0:1,4\"\n");
+    std::ofstream(rig_) << toml;
+    const auto captured = capture({"--rig", rig_, "--out", vase_});
+    EXPECT_EQ(captured.status, 0) << captured.err;
+    const auto findings = nlohmann::json::parse(captured.out).at("findings");
+    ASSERT_EQ(findings.size(), 1U);
+    EXPECT_THAT(findings[0].get<std::string>(), HasSubstr("lamp-02 and lamp-05 are exchanged"));
+    EXPECT_THAT(captured.err, HasSubstr("lamp-02 and lamp-05 are exchanged"));
+    EXPECT_THAT(darkbox_program({"verify", vase_}).err, HasSubstr("2 frames were not verified"));
+    // Once the wiring is right, what is in doubt is taken again without being named.
+    std::ofstream(rig_) << test::small_rig(6);
+    const auto again = capture({"--rig", rig_, "--retake", vase_, "--out", again_});
+    ASSERT_EQ(again.status, 0) << again.err;
+    EXPECT_TRUE(nlohmann::json::parse(again.out).at("findings").empty());
+    EXPECT_THAT(darkbox_program({"verify", again_}).err, testing::Not(HasSubstr("not verified")));
+}
+
 TEST_F(CaptureCommand, RefusesWhatMakesNoSense) {
     EXPECT_THAT(capture({"--rig", rig_, "--exposure", "bright"}).err, HasSubstr("neither auto nor microseconds"));
     EXPECT_THAT(capture({"--rig", rig_, "--retake", vase_, "--exposure", "auto"}).err,

@@ -81,6 +81,20 @@ TEST_F(DaemonProcess, CapturesForTheCommandLine) {
     EXPECT_THAT(again.err, HasSubstr("already"));
 }
 
+TEST_F(DaemonProcess, NamesLampsThatAreExchanged) {
+    std::string toml = small_rig(6);
+    toml.replace(toml.find("[sim]\n"), 6, "[sim]\nfaults = \"swapped-lamps@0:1,4\"\n");
+    std::ofstream(rig_) << toml;
+    start();
+    const Ended ended = darkbox({"capture", "--out", "cat", "--json"});
+    ASSERT_EQ(ended.status, 0) << ended.err;
+    const json findings = json::parse(ended.out).at("findings");
+    ASSERT_EQ(findings.size(), 1U);
+    EXPECT_THAT(findings[0].get<std::string>(), HasSubstr("lamp-02 and lamp-05 are exchanged"));
+    EXPECT_EQ(client_.call("GET", "jobs/1").at("findings"), findings);
+    EXPECT_EQ(Session::open(sessions_ / "cat").events().back().what, findings[0]);
+}
+
 TEST_F(DaemonProcess, SigtermDuringACaptureLeavesItResumable) {
     start();
     client_.call("POST", "captures", {{"name", "vase"}});

@@ -25,6 +25,7 @@ public:
 
     const std::vector<FrameRecord>& kept() const override { return kept_; }
     Frame read(const FrameRecord&) const override { throw std::logic_error("nothing is kept"); }
+    void withdraw(const std::string& file, const std::string&) override { throw std::logic_error("withdrew " + file); }
     void note_event(const std::string& what) override {
         if (what.find("is too short") != std::string::npos) unfit = true;
         if (what.find(" mode: ") != std::string::npos) left_mode = true;

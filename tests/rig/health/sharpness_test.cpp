@@ -1,4 +1,4 @@
-#include "processing/calibration/sharpness.h"
+#include "rig/health/sharpness.h"
 
 #include <gtest/gtest.h>
 
@@ -36,6 +36,20 @@ TEST(Blur, IsTheEdgesOwnWidth) {
 TEST(Blur, IsFoundInNoise) {
     for (const double sigma : {1.0, 2.0})
         EXPECT_NEAR(*measure_blur(edge(sigma, 0.002), everywhere), sigma, 0.15 * sigma);
+}
+
+/// Thin lines beside an edge, all of them blurred alike: read as edges, they would look a third too sharp.
+TEST(Blur, IsNotReadOffLines) {
+    for (const double sigma : {1.5, 2.0, 3.0}) {
+        cv::Mat1f picture = edge(sigma);
+        const auto line = [&](double u) { return std::exp(-u * u / (2 * sigma * sigma)); };
+        for (int v = 0; v < picture.rows; ++v)
+            for (int u = 0; u < picture.cols; ++u)
+                picture(v, u) += static_cast<float>(0.4 * (line(u - 12.0) + line(u - 28.0) + line(u - 85.0)));
+        const auto found = measure_blur(picture, everywhere);
+        ASSERT_TRUE(found) << sigma;
+        EXPECT_NEAR(*found, sigma, 0.15 * sigma);
+    }
 }
 
 TEST(Blur, OfNothingIsNotTold) {

@@ -1,4 +1,4 @@
-#include "processing/calibration/sharpness.h"
+#include "processing/calibration/reblur.h"
 
 #include <algorithm>
 #include <cmath>
@@ -35,7 +35,7 @@ bool is_crest(const cv::Mat1f& slope, int v, int u) {
 
 }  // namespace
 
-std::optional<double> measure_blur(const cv::Mat1f& picture, const cv::Mat1b& mask, std::size_t fewest_edges) {
+std::optional<double> edge_width_px(const cv::Mat1f& picture, const cv::Mat1b& mask, std::size_t fewest_edges) {
     cv::Mat1f softer;
     cv::GaussianBlur(picture, softer, {}, again_px);
     const cv::Mat1f slope = slopes(picture), soft_slope = slopes(softer);
