@@ -32,7 +32,7 @@ struct CaptureRequest {
     std::optional<std::filesystem::path> retake = {};
     ObjectRecord record = {};  ///< of the object; a resumed session keeps its own
     CaptureListener listener = {};
-    ReviewSession review = {};  ///< of the whole session before it is sealed; empty: none
+    ReviewSession review = {};            ///< of the whole session before it is sealed; empty: none
     std::vector<std::string> notes = {};  ///< what the session is to keep of how it began
 };
 
