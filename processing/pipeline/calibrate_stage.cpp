@@ -13,6 +13,7 @@
 #include "processing/formats/picture.h"
 #include "processing/formats/png.h"
 #include "processing/maps/parallel.h"
+#include "processing/pipeline/ball_focus.h"
 #include "processing/pipeline/ball_picture.h"
 #include "processing/pipeline/given_lights.h"
 #include "processing/pipeline/intensities.h"
@@ -256,6 +257,7 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
         summary.seconds.solve = std::max(0.0, watch.lap() - ball.seconds());
         const BallView view = view_of_balls(ball.brightest(), summary.calibration.balls);
         write_png(files.ball_picture, draw_balls(view, summary.calibration));
+        summary.blur_px = ball_blur_px(ball, summary.calibration.balls);
     }
     if (options.from || given) leave_out(summary.calibration, options.calibration.drop);
     summary.calibration = with_measured_intensities(session, std::move(summary.calibration), card_of(options), work);

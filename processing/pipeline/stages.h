@@ -43,6 +43,7 @@ struct CalibrateSummary {
     Calibration calibration;
     std::vector<std::string> removed;  ///< folders made with the lights of before
     StageSeconds seconds;
+    std::optional<double> blur_px = {};  ///< at the ball; see ball_focus.h
 };
 /// Writes calibration/lights.json, lights.lp, ball.png. What the session knows of the rig's geometry serves where the
 /// options leave it open; directions of near lamps hold at the object's centroid (of its mask, which is found without

@@ -53,9 +53,11 @@ ordered_json to_json(const CalibrateSummary& summary) {
     ordered_json lights = ordered_json::array(), balls = ordered_json::array();
     for (const Light& light : calibration.lights) lights.push_back(light_json(light));
     for (const Ball& ball : calibration.balls) balls.push_back(ball_json(ball));
+    const ordered_json blur = summary.blur_px ? ordered_json(*summary.blur_px) : ordered_json();
     return {{"method", calibration.method},
             {"lights", lights},
             {"balls", balls},
+            {"blur_px", blur},
             {"intensity_origin", name(calibration.intensity_origin)},
             {"condition_number", calibration.condition_number},
             {"light_geometry", geometry_json(light_geometry(calibration.lights))},

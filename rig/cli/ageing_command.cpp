@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <chrono>
-#include <cstdio>
 #include <memory>
 #include <optional>
 
@@ -25,23 +23,13 @@ struct AgeingArguments {
     fs::path table;
 };
 
-/// Of "2026-01-31T…": days since 1970; no value for another form.
-std::optional<double> day_of(const std::string& when) {
-    int year = 0, month = 0, day = 0;
-    if (std::sscanf(when.c_str(), "%d-%d-%d", &year, &month, &day) != 3) return std::nullopt;
-    const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
-                                           std::chrono::day(static_cast<unsigned>(day))};
-    if (!date.ok()) return std::nullopt;
-    return static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count());
-}
-
 std::vector<DatedLights> history_of(const AgeingArguments& a, const fs::path& folder) {
     Catalog catalog(folder, Catalog::Place::in_memory);
     catalog.refresh();
     std::vector<DatedLights> history;
     std::string rig = a.rig;
     for (const CatalogCalibration& c : catalog.calibrations({.limit = 1'000'000})) {
-        const auto day = day_of(c.created);
+        const auto day = day_of_date(c.created);
         if (rig.empty()) rig = c.rig;
         if (!day || c.rig != rig) continue;
         StoredCalibration stored = read_calibration(ResultFiles(folder / c.session).calibration);

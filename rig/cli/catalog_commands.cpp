@@ -1,12 +1,15 @@
 #include <fmt/format.h>
 
+#include <map>
 #include <memory>
 #include <optional>
 
+#include "processing/pipeline/ball_focus.h"
 #include "rig/cli/daemon_questions.h"
 #include "rig/cli/rig_commands.h"
 #include "rig/daemon/api_words.h"
 #include "rig/daemon/folder_lock.h"
+#include "rig/daemon/lamp_ageing.h"
 
 namespace darkbox {
 namespace {
@@ -122,6 +125,7 @@ Json calibrations_on_disk(const fs::path& folder) {
     Json list = Json::array();
     for (const CatalogCalibration& calibration : catalog.calibrations({.limit = everything})) {
         Json entry = Json::parse(to_json(calibration).dump());
+        if (const auto blur = stored_blur_px(folder / calibration.session)) entry["blur_px"] = *blur;
         entry["drift"] = Json::array();
         for (const CatalogDrift& drift : catalog.drifts(calibration.session))
             entry["drift"].push_back(Json::parse(to_json(drift).dump()));
@@ -143,20 +147,43 @@ std::string since(const Json& calibration, const std::string& role, std::vector<
     return "-";
 }
 
+/// How the blur at the ball of each rig changes over its calibrations.
+void tell_focus(CommandResult& result) {
+    std::map<std::string, std::vector<LampAgeing::Reading>> of_rigs;
+    for (const Json& c : result.json.at("calibrations"))
+        if (const auto day = day_of_date(text(c, "created")); day && c.contains("blur_px"))
+            of_rigs[text(c, "rig")].push_back({*day, c.at("blur_px").get<double>()});
+    result.json["focus"] = Json::array();
+    for (auto& [rig, readings] : of_rigs) {
+        const auto trend = trend_of(rig, std::move(readings));
+        if (!trend) continue;
+        result.json["focus"].push_back({{"rig", rig},
+                                        {"readings", trend->readings.size()},
+                                        {"blur_percent_per_month", trend->percent_per_month},
+                                        {"sigma", trend->sigma},
+                                        {"blur_ratio", trend->left}});
+        result.text +=
+            fmt::format("focus of {}: the blur changed by {:+.1f} % over {} calibrations, {:+.2f} ± {:.2f} % a month\n",
+                        rig, (trend->left - 1) * 100, trend->readings.size(), trend->percent_per_month, trend->sigma);
+    }
+}
+
 CommandResult calibrations(const CatalogArguments& a) {
     CommandResult result;
     const auto client = daemon_of(a);
     result.json = client ? ask_for_all(*client, "calibrations") : calibrations_on_disk(folder_of(a));
-    result.text = fmt::format("{:<36} {:<25} {:>9} {:>9} {:>8}  {:<8} {}\n", "session", "made", "lamps", "condition",
-                              "sigma °", "last", "first");
+    result.text = fmt::format("{:<36} {:<25} {:>9} {:>9} {:>8} {:>8}  {:<8} {}\n", "session", "made", "lamps",
+                              "condition", "sigma °", "blur px", "last", "first");
     for (const Json& c : result.json.at("calibrations")) {
         const std::string used = fmt::format("{}/{}", c.at("used").get<int>(), c.at("lamps").get<int>());
         const std::string last = since(c, "last", result.warnings);
-        result.text += fmt::format("{:<36} {:<25} {:>9} {:>9.2f} {:>8.3f}  {:<8} {}\n", text(c, "session"),
+        const std::string blur = c.contains("blur_px") ? fmt::format("{:.2f}", c.at("blur_px").get<double>()) : "-";
+        result.text += fmt::format("{:<36} {:<25} {:>9} {:>9.2f} {:>8.3f} {:>8}  {:<8} {}\n", text(c, "session"),
                                    text(c, "created"), used, c.at("condition_number").get<double>(),
-                                   c.at("sigma_deg").get<double>(), last, since(c, "first", result.warnings));
+                                   c.at("sigma_deg").get<double>(), blur, last, since(c, "first", result.warnings));
     }
     if (result.json.at("calibrations").empty()) result.text = "no calibrations\n";
+    tell_focus(result);
     result.text.pop_back();
     return result;
 }

@@ -4,6 +4,7 @@
 
 #include "acquisition/frame/error.h"
 #include "acquisition/session/bag.h"
+#include "processing/pipeline/ball_focus.h"
 #include "rig/daemon/api.h"
 #include "rig/daemon/api_words.h"
 #include "rig/daemon/capture_order_json.h"
@@ -210,6 +211,7 @@ ApiResponse Api::calibrations(const Call& call) const {
     end_page(json, calibrations, limit, [](const CatalogCalibration& c) { return c.session; });
     for (const CatalogCalibration& calibration : calibrations) {
         Json entry = to_json(calibration);
+        if (const auto blur = stored_blur_px(service_.sessions() / calibration.session)) entry["blur_px"] = *blur;
         entry["drift"] = Json::array();
         for (const CatalogDrift& drift : catalog.drifts(calibration.session)) entry["drift"].push_back(to_json(drift));
         json["calibrations"].push_back(std::move(entry));

@@ -9,6 +9,7 @@
 #include "acquisition/frame/error.h"
 #include "processing/calibration/drift.h"
 #include "processing/formats/calibration_file.h"
+#include "processing/pipeline/ball_focus.h"
 #include "processing/pipeline/session_files.h"
 
 namespace darkbox {
@@ -20,6 +21,15 @@ RigLights stored_lights(const fs::path& session) {
     StoredCalibration stored = read_calibration(ResultFiles(session).calibration);
     return {std::move(stored.rig), std::move(stored.calibration.lights),
             stored.calibration.intensity_origin != IntensityOrigin::unknown};
+}
+
+/// The focus ring turns, the lens holder gives, or the ball is not where it was.
+std::string softer(const fs::path& before, const fs::path& after, const DriftAlarm& alarm) {
+    const auto was = stored_blur_px(before), is = stored_blur_px(after);
+    if (!was || !is || *is < alarm.blur_ratio * *was || *is < *was + alarm.blur_px) return "";
+    return fmt::format(
+        "the picture is less sharp: edges at the ball are {:.2f} px wide, {:.2f} before (alarm above {:.0f} %)", *is,
+        *was, alarm.blur_ratio * 100);
 }
 
 std::string alarm_of(const LampDrift& lamp, const DriftAlarm& alarm) {
@@ -63,9 +73,15 @@ CatalogDrift compare_calibrations(const fs::path& folder, const std::string& bef
     CatalogDrift result{.session = after, .against = before, .role = role};
     try {
         const Drift drift = drift_between(stored_lights(folder / before), stored_lights(folder / after));
-        result.steady = drift.steady();
+        const std::string blurred = softer(folder / before, folder / after, alarm);
+        result.steady = drift.steady() && blurred.empty();
         result.alarm = alarms_of(drift, alarm);
-        result.findings_json = nlohmann::json(drift.findings).dump();
+        nlohmann::json findings(drift.findings);
+        if (!blurred.empty()) {
+            result.alarm += (result.alarm.empty() ? "" : "; ") + blurred;
+            findings.push_back(blurred);
+        }
+        result.findings_json = findings.dump();
     } catch (const Error& error) {
         result.steady = false;
         result.alarm = fmt::format("cannot be compared with {}: {}", before, error.what());

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <map>
 
 namespace darkbox {
@@ -64,6 +66,20 @@ LampAgeing fitted(const std::string& lamp, Readings readings) {
 }
 
 }  // namespace
+
+std::optional<LampAgeing> trend_of(const std::string& what, Readings readings) {
+    if (readings.size() < fewest_readings || readings.front().day == readings.back().day) return std::nullopt;
+    return fitted(what, std::move(readings));
+}
+
+std::optional<double> day_of_date(const std::string& when) {
+    int year = 0, month = 0, day = 0;
+    if (std::sscanf(when.c_str(), "%d-%d-%d", &year, &month, &day) != 3) return std::nullopt;
+    const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
+                                           std::chrono::day(static_cast<unsigned>(day))};
+    if (!date.ok()) return std::nullopt;
+    return static_cast<double>(std::chrono::sys_days(date).time_since_epoch().count());
+}
 
 std::vector<LampAgeing> lamp_ageing(const std::vector<DatedLights>& history) {
     std::vector<std::string> order;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,13 @@ struct LampAgeing {
     double sigma = 0;              ///< of percent_per_month, from the readings' scatter about the line
     double left = 1;               ///< of its light at first, by the line, at the last reading
 };
+
+/// The same of any series of positive readings, in the order of their days; no value for fewer than three, or
+/// all of one day.
+std::optional<LampAgeing> trend_of(const std::string& what, std::vector<LampAgeing::Reading> readings);
+
+/// Of "2026-01-31T...": days since 1970; no value for another form.
+std::optional<double> day_of_date(const std::string& when);
 
 /// In the order of the first calibration. Calibrations without known intensities say nothing here; lamps with fewer
 /// than three readings are left out.

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <malloc.h>
+
 #include <fstream>
 #include <optional>
 #include <string>
@@ -11,6 +13,7 @@ namespace darkbox::test {
 class PeakMemory {
 public:
     PeakMemory() {
+        malloc_trim(0);  // else what earlier work left unused would be taken again, and not counted
         std::ofstream("/proc/self/clear_refs") << "5";
         before_kib_ = kib_of("VmRSS:");
         told_ = kib_of("VmHWM:") < before_kib_ + 1024;

@@ -34,12 +34,12 @@ cv::Mat1f scene(cv::Point2d moved, double noise_sigma = 0, std::uint32_t seed = 
     return picture;
 }
 
-const cv::Mat1b everywhere(120, 160, uchar{255});
+const cv::Mat1b whole_picture(120, 160, uchar{255});
 
 TEST(Registration, FindsAnExactShift) {
     for (const cv::Point2d moved : {cv::Point2d(0, 0), cv::Point2d(0.1, 0), cv::Point2d(0.5, -0.25),
                                     cv::Point2d(-1.3, 2.7), cv::Point2d(6.4, 3.1), cv::Point2d(-15.5, 12.25)}) {
-        const auto found = measure_shift(scene({0, 0}), scene(moved), everywhere);
+        const auto found = measure_shift(scene({0, 0}), scene(moved), whole_picture);
         ASSERT_TRUE(found) << moved;
         EXPECT_NEAR(found->px.x, moved.x, 0.005) << moved;
         EXPECT_NEAR(found->px.y, moved.y, 0.005) << moved;
@@ -48,7 +48,7 @@ TEST(Registration, FindsAnExactShift) {
 }
 
 TEST(Registration, LeavesAlampsFlickerOut) {
-    const auto found = measure_shift(scene({0, 0}), scene({0.3, 0}, 0, 1, 0.8), everywhere);
+    const auto found = measure_shift(scene({0, 0}), scene({0.3, 0}, 0, 1, 0.8), whole_picture);
     ASSERT_TRUE(found);
     EXPECT_NEAR(found->px.x, 0.3, 0.005);
 }
@@ -59,7 +59,7 @@ TEST(Registration, KnowsItsOwnNoise) {
     const cv::Point2d moved(0.4, -0.2);
     double sum_x = 0, squares = 0, told = 0;
     for (std::uint32_t i = 0; i < trials; ++i) {
-        const auto found = measure_shift(scene({0, 0}, 0.03, 2 * i + 1), scene(moved, 0.03, 2 * i + 2), everywhere);
+        const auto found = measure_shift(scene({0, 0}, 0.03, 2 * i + 1), scene(moved, 0.03, 2 * i + 2), whole_picture);
         ASSERT_TRUE(found);
         sum_x += found->px.x - moved.x;
         squares += (found->px - moved).dot(found->px - moved) / 2;
@@ -88,13 +88,13 @@ TEST(Registration, LooksWhereItIsToldTo) {
 }
 
 TEST(Registration, SaysNothingOfWhatHasNoEdge) {
-    EXPECT_FALSE(measure_shift(cv::Mat1f(120, 160, 0.5F), cv::Mat1f(120, 160, 0.5F), everywhere));
+    EXPECT_FALSE(measure_shift(cv::Mat1f(120, 160, 0.5F), cv::Mat1f(120, 160, 0.5F), whole_picture));
     EXPECT_FALSE(measure_shift(scene({0, 0}), scene({0, 0}), cv::Mat1b(120, 160, uchar{0})));
     std::mt19937 random(3);
     std::normal_distribution<float> noise(0.5F, 0.1F);
     cv::Mat1f other(120, 160);
     for (float& value : other) value = noise(random);
-    EXPECT_FALSE(measure_shift(scene({0, 0}), other, everywhere)) << "another scene";
+    EXPECT_FALSE(measure_shift(scene({0, 0}), other, whole_picture)) << "another scene";
 }
 
 }  // namespace
