@@ -313,9 +313,10 @@ private:
         finding.words = "too little in the picture has an edge";
         if (!movement) return add(finding);
         finding.value = movement->object.length();
-        finding.words = movement->words() + ", from the first frame to the last";
+        finding.words = fmt::format("from the first frame to the last (noise {:.1g} px)", movement->object.sigma_px);
         finding.remedy = "look for what is loose: object, camera, tripod, table; let it come to rest";
         const bool failed = movement->moved(options_.most_movement_px);
+        if (failed) finding.words = movement->words() + ", from the first frame to the last";
         const bool noisy = 3 * movement->object.sigma_px > options_.most_movement_px;
         finding.verdict = failed ? RigVerdict::failed : noisy ? RigVerdict::untold : RigVerdict::good;
         add(finding);
