@@ -3,15 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <opencv2/imgproc.hpp>
 #include <vector>
+
+#include "processing/calibration/strong_edges.h"
 
 namespace darkbox {
 namespace {
 
-constexpr double strong_share = 0.3;      ///< of the strongest slope: edges from here on are looked at
-constexpr double sharpest_share = 0.15;   ///< of the steps
-constexpr double slopes_of_noise = 8.0;   ///< an edge is this much steeper than noise
 constexpr std::size_t fewest_edges = 20;  ///< pixels that are looked at
 constexpr std::size_t fewest_steps = 5;
 constexpr double farthest_px = 12;  ///< that a step is followed to either side
@@ -20,31 +18,6 @@ constexpr double patience_px = 1;           ///< beyond the last rise: noise may
 constexpr double most_return = 0.2;         ///< of a step's height, past its end
 constexpr double followed = 2.1;            ///< of its standard deviation, past its end
 constexpr double slope_variance = 1.0 / 3;  ///< px^2, of the two pixels that a slope is read over
-
-struct Slopes {
-    cv::Mat1f dx, dy, size;
-};
-
-Slopes slopes(const cv::Mat1f& picture) {
-    Slopes result;
-    const cv::Mat1f kernel = (cv::Mat1f(1, 3) << -0.5F, 0, 0.5F);
-    cv::filter2D(picture, result.dx, CV_32F, kernel);
-    cv::filter2D(picture, result.dy, CV_32F, kernel.t());
-    cv::magnitude(result.dx, result.dy, result.size);
-    return result;
-}
-
-template <typename Number>
-Number quantile(std::vector<Number>& values, double share) {
-    const auto place = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), place, values.end());
-    return *place;
-}
-
-bool is_crest(const cv::Mat1f& slope, int v, int u) {
-    const float here = slope(v, u);
-    return (here >= slope(v, u - 1) && here >= slope(v, u + 1)) || (here >= slope(v - 1, u) && here >= slope(v + 1, u));
-}
 
 /// The picture along a line through a pixel.
 class Profile {
@@ -108,28 +81,16 @@ std::optional<double> blur_of_step(const Profile& profile, double slope) {
 }  // namespace
 
 std::optional<double> measure_blur(const cv::Mat1f& picture, const cv::Mat1b& mask) {
-    const Slopes slope = slopes(picture);
-    cv::Mat1b inside;  // not the mask's own border
-    cv::erode(mask, inside, cv::Mat(), {-1, -1}, 5, cv::BORDER_CONSTANT, cv::Scalar(0));
-    std::vector<float> all;
-    for (int v = 1; v + 1 < picture.rows; ++v)
-        for (int u = 1; u + 1 < picture.cols; ++u)
-            if (inside(v, u)) all.push_back(slope.size(v, u));
-    if (all.size() < fewest_edges) return std::nullopt;
-    const float strongest = quantile(all, 0.999), usual = quantile(all, 0.5);
-    const double least = std::max(strong_share * strongest, std::min(slopes_of_noise * usual, 0.8 * strongest));
-    std::size_t edges = 0;
+    const Slopes slopes = slopes_of(picture);
+    const std::vector<cv::Point> edges = strong_edges(slopes, mask, fewest_edges);
     std::vector<double> blurs;
-    for (int v = 1; v + 1 < picture.rows; ++v)
-        for (int u = 1; u + 1 < picture.cols; ++u) {
-            const float here = slope.size(v, u);
-            if (!inside(v, u) || here < least || here == 0 || !is_crest(slope.size, v, u)) continue;
-            ++edges;
-            const Profile profile(picture, cv::Point2d(u, v), {slope.dx(v, u) / here, slope.dy(v, u) / here});
-            if (const auto blur = blur_of_step(profile, here)) blurs.push_back(*blur);
-        }
-    if (edges < fewest_edges || blurs.size() < fewest_steps) return std::nullopt;
-    return quantile(blurs, sharpest_share);
+    for (const cv::Point& at : edges) {
+        const float here = slopes.size(at);
+        const Profile profile(picture, at, {slopes.dx(at) / here, slopes.dy(at) / here});
+        if (const auto blur = blur_of_step(profile, here)) blurs.push_back(*blur);
+    }
+    if (edges.size() < fewest_edges || blurs.size() < fewest_steps) return std::nullopt;
+    return sharpest_of(blurs);
 }
 
 }  // namespace darkbox

@@ -55,18 +55,10 @@ protected:
         return daemon->ended();
     }
 
-    Session session(const std::string& object) const { return Session::open(daemon->sessions() / object); }
-
-    /// Where the host finds it when the machine is off.
-    void hand_out(const std::string& object) const {
-        fs::create_directories("/run/hil/sessions");
-        fs::copy(daemon->sessions() / object, "/run/hil/sessions/" + object, fs::copy_options::recursive);
-    }
-
     void expect_complete(const std::string& object, std::size_t frames) {
         const auto end = daemon->ended();
         ASSERT_EQ(end.at("event"), "done") << end.dump();
-        const Session captured = session(object);
+        const Session captured = daemon->session(object);
         captured.verify();
         EXPECT_EQ(captured.frames().size(), frames);
         for (const FrameRecord& frame : captured.frames()) {
@@ -89,7 +81,7 @@ TEST_F(ClosedLoop, SixteenLampsThroughDarkboxd) {
     daemon->start_capture("whole");
     expect_complete("whole", 18);
     EXPECT_TRUE(chip->high_lines().empty());
-    hand_out("whole");
+    daemon->hand_out("whole");
 }
 
 TEST_F(ClosedLoop, ExposureAndGainActOnPixels) {
@@ -132,7 +124,7 @@ protected:
         }
         expect_complete("damaged", 3);
         test::put("0", "/sys/module/uvcvideo/parameters/nodrop");
-        return session("damaged");
+        return daemon->session("damaged");
     }
 };
 
@@ -156,7 +148,8 @@ TEST_F(ClosedLoop, UnpluggedCameraIsWaitedForInTheDark) {
     EXPECT_FALSE(fs::exists(camera_node)) << "dark before it came back";
     while (!fs::exists(camera_node)) EXPECT_TRUE(chip->high_lines().empty());
     expect_complete("unplugged", 4);
-    EXPECT_THAT(session("unplugged").events(), Contains(Field(&SessionEvent::what, HasSubstr("was unplugged"))));
+    EXPECT_THAT(daemon->session("unplugged").events(),
+                Contains(Field(&SessionEvent::what, HasSubstr("was unplugged"))));
 }
 
 /// Negative controls: a loop that is not closed must not pass.
@@ -176,7 +169,7 @@ TEST_F(ClosedLoop, SwappedLampsAreLeftToTheComparisonWithTruth) {
     start_daemon();
     daemon->start_capture("swapped", {"lamp-01", "lamp-02", "lamp-03", "lamp-04", "lamp-05", "lamp-06"});
     expect_complete("swapped", 8);
-    hand_out("swapped");
+    daemon->hand_out("swapped");
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "acquisition/session/session.h"
 #include "rig/daemon/client.h"
 #include "tests/support/child_process.h"
 
@@ -29,6 +30,9 @@ public:
     /// That of its own child process which holds the lamps' lines.
     int guardian() const;
     std::filesystem::path sessions() const { return folder_ / "sessions"; }
+    Session session(const std::string& object) const { return Session::open(sessions() / object); }
+    /// Copies that session to where the host finds it when the machine is off.
+    void hand_out(const std::string& object) const;
     void signal(int number) const;
     int wait() { return child_.wait(); }
     std::string log() const { return child_.err(); }

@@ -193,15 +193,10 @@ protected:
         ASSERT_TRUE(test::comes_true([] { return fs::exists(usb_camera_node); })) << twin->err();
         daemon.emplace(folder.path(), rig);
     }
-    Session session(const std::string& object) const { return Session::open(daemon->sessions() / object); }
-    void hand_out(const std::string& object) const {
-        fs::create_directories("/run/hil/sessions");
-        fs::copy(daemon->sessions() / object, "/run/hil/sessions/" + object, fs::copy_options::recursive);
-    }
     void expect_complete(const std::string& object, std::size_t frames) {
         const auto end = daemon->ended();
         ASSERT_EQ(end.at("event"), "done") << end.dump();
-        const Session captured = session(object);
+        const Session captured = daemon->session(object);
         captured.verify();
         EXPECT_EQ(captured.frames().size(), frames);
         for (const FrameRecord& frame : captured.frames())
@@ -219,7 +214,7 @@ TEST_F(UsbSession, SixteenLampsThroughDarkboxd) {
     plug_in("settled");
     daemon->start_capture("usb");
     expect_complete("usb", usb_lamp_count + 2);
-    hand_out("usb");
+    daemon->hand_out("usb");
     daemon.reset();
     std::cout << "  the board: " << board->unplug();
 }
@@ -231,7 +226,7 @@ TEST_F(UsbSession, StepsAtTheCamerasStrobeOrSaysWhyNot) {
     daemon->start_capture("strobed");
     expect_complete("strobed", usb_lamp_count + 2);
     std::size_t stepped = 0;
-    const Session captured = session("strobed");
+    const Session captured = daemon->session("strobed");
     for (const FrameRecord& frame : captured.frames())
         stepped += frame.verification.find("strobe's step") != std::string::npos ? 1 : 0;
     std::cout << "  " << stepped << " of " << usb_lamp_count << " lamps by the strobe\n";
@@ -259,7 +254,8 @@ TEST_F(UsbSession, APulledCableRepeatsTheShot) {
     EXPECT_TRUE(test::comes_true([&] { return board->is_dark(); }));
     board->plug_cable();
     expect_complete("knocked", 4);
-    EXPECT_THAT(session("knocked").events(), Contains(Field(&SessionEvent::what, HasSubstr("lamp controller"))));
+    EXPECT_THAT(daemon->session("knocked").events(),
+                Contains(Field(&SessionEvent::what, HasSubstr("lamp controller"))));
 }
 
 }  // namespace

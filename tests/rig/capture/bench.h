@@ -33,6 +33,16 @@ struct Bench {
         work.stop = stop.get_token();
         return capture_session(request(start), rig, lamps, camera, clock, work).session;
     }
+    /// A capture that is stopped while the n-th lamp is lit, and may be gone on with.
+    void interrupt_at_lamp(int n) {
+        int lit = 0;
+        lamps.hook = [&, n](const std::string& call) {
+            if (call == "light" && ++lit == n) stop.request_stop();
+        };
+        error<Cancelled>();
+        stop = std::stop_source();
+        lamps.hook = {};
+    }
     /// What capture() says when it fails with this kind of error.
     template <typename Kind>
     std::string error(CaptureStart start = CaptureStart::create) {

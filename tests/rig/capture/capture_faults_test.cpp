@@ -245,12 +245,7 @@ TEST(LampFaults, WhatADarkFramePutInDoubtIsTakenAgainOnResume) {
 /// As an earlier darkbox left it.
 TEST(LampFaults, ASessionWithAFrameThatWasNotVerifiedIsNotResumed) {
     Bench bench;
-    int lit = 0;
-    bench.lamps.hook = [&](const std::string& call) {
-        if (call == "light" && ++lit == 3) bench.stop.request_stop();
-    };
-    bench.error<Cancelled>();
-    bench.stop = std::stop_source();
+    bench.interrupt_at_lamp(3);
     {
         SessionWriter left = SessionWriter::resume(bench.request().folder);
         FrameRecord record = left.acknowledged().back();
@@ -264,12 +259,7 @@ TEST(LampFaults, ASessionWithAFrameThatWasNotVerifiedIsNotResumed) {
 
 TEST(LampFaults, ALampThatStuckDuringABreakIsFound) {
     Bench bench;
-    int lit = 0;
-    bench.lamps.hook = [&](const std::string& call) {
-        if (call == "light" && ++lit == 3) bench.stop.request_stop();
-    };
-    bench.error<Cancelled>();
-    bench.stop = std::stop_source();
+    bench.interrupt_at_lamp(3);
     bench.lamps.stuck = {0, bench.clock.now()};
     EXPECT_THAT(bench.error<InputError>(CaptureStart::resume), HasSubstr("differs from the first"));
 }

@@ -3,31 +3,17 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
-#include <random>
+
+#include "tests/support/blurred_edge.h"
 
 namespace darkbox {
 namespace {
-
-/// A bright half plane whose edge is a Gaussian's integral of this width.
-cv::Mat1f edge(double sigma, double noise_sigma = 0) {
-    std::mt19937 random(1);
-    std::normal_distribution<float> noise(0, static_cast<float>(noise_sigma));
-    cv::Mat1f picture(100, 100);
-    for (int v = 0; v < 100; ++v)
-        for (int u = 0; u < 100; ++u) {
-            const double across = (u - 50.3) * std::cos(0.3) + (v - 49.7) * std::sin(0.3);
-            picture(v, u) = static_cast<float>(0.1 + 0.25 * (1 + std::erf(across / sigma / std::numbers::sqrt2)));
-            if (noise_sigma > 0) picture(v, u) += noise(random);
-        }
-    return picture;
-}
 
 const cv::Mat1b everywhere(100, 100, uchar{255});
 
 TEST(Blur, IsTheEdgesOwnWidth) {
     for (const double sigma : {1.0, 1.5, 2.0, 3.0, 4.0}) {
-        const auto found = measure_blur(edge(sigma), everywhere);
+        const auto found = measure_blur(test::blurred_edge(sigma), everywhere);
         ASSERT_TRUE(found) << sigma;
         EXPECT_NEAR(*found, sigma, 0.1 * sigma + 0.1);
     }
@@ -35,13 +21,13 @@ TEST(Blur, IsTheEdgesOwnWidth) {
 
 TEST(Blur, IsFoundInNoise) {
     for (const double sigma : {1.0, 2.0})
-        EXPECT_NEAR(*measure_blur(edge(sigma, 0.002), everywhere), sigma, 0.15 * sigma);
+        EXPECT_NEAR(*measure_blur(test::blurred_edge(sigma, 0.002), everywhere), sigma, 0.15 * sigma);
 }
 
 /// Thin lines beside an edge, all of them blurred alike: read as edges, they would look a third too sharp.
 TEST(Blur, IsNotReadOffLines) {
     for (const double sigma : {1.5, 2.0, 3.0}) {
-        cv::Mat1f picture = edge(sigma);
+        cv::Mat1f picture = test::blurred_edge(sigma);
         const auto line = [&](double u) { return std::exp(-u * u / (2 * sigma * sigma)); };
         for (int v = 0; v < picture.rows; ++v)
             for (int u = 0; u < picture.cols; ++u)
@@ -54,7 +40,7 @@ TEST(Blur, IsNotReadOffLines) {
 
 TEST(Blur, OfNothingIsNotTold) {
     EXPECT_FALSE(measure_blur(cv::Mat1f(100, 100, 0.5F), everywhere));
-    EXPECT_FALSE(measure_blur(edge(1), cv::Mat1b(100, 100, uchar{0})));
+    EXPECT_FALSE(measure_blur(test::blurred_edge(1), cv::Mat1b(100, 100, uchar{0})));
 }
 
 }  // namespace
