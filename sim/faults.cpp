@@ -39,6 +39,8 @@ constexpr std::array rows{Row{FaultKind::drop, "drop", 0},
                           Row{FaultKind::camera_knock, "camera-knock", 0, 20.0},
                           Row{FaultKind::warming, "warming", 0, 0.2},
                           Row{FaultKind::hot_lamps, "hot-lamps", 0, 200.0},
+                          Row{FaultKind::failed_write, "failed-write", 0},
+                          Row{FaultKind::full_disk, "full-disk", 0},
                           Row{FaultKind::object_knock, "object-knock", 0, 20.0}};
 
 [[noreturn]] void throw_bad_fault(const std::string& word) {

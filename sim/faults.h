@@ -31,12 +31,14 @@ enum class FaultKind {
     camera_knock,   ///< the picture lies `amount` pixels further right
     warming,        ///< the black level is too high by `amount` of full scale at first, by half every 30 s
     hot_lamps,      ///< the lamps' heat sink has `amount` degrees Celsius
+    failed_write,   ///< the session's `at`th write, counted from 0, and the `count` - 1 after it fail (EIO)
+    full_disk,      ///< likewise, in the middle of what is written (ENOSPC)
     object_knock,   ///< what is not the mirror ball lies `amount` pixels further right
 };
 
-/// One fault. Camera faults: `at` is the frame's sequence and `count` frames are hit (hang: `count` waits). Lamp
-/// faults: `at` is the number of the light() or dark() call, counted from 0, from which on it holds. Those with an
-/// amount last from `at` on; `count` is not used for them.
+/// One fault. Camera faults: `at` is the frame's sequence and `count` frames are hit (hang: `count` waits). Faults of
+/// the disk: likewise for writes. Lamp faults: `at` is the number of the light() or dark() call, counted from 0, from
+/// which on it holds. Those with an amount last from `at` on; `count` is not used for them.
 struct Fault {
     FaultKind kind = FaultKind::drop;
     std::uint64_t at = 0;

@@ -57,6 +57,7 @@ SimRig SimRig::make(const RigDescription& rig, const FaultPlan& more_faults) {
     LampWitness& witness = result.seen_ ? static_cast<LampWitness&>(*result.seen_) : *result.lamps_;
     result.camera_ = std::make_unique<SimCamera>(*result.scene_, witness, *result.clock_, options);
     result.door_ = std::make_unique<SimDoor>(*result.camera_, faults);
+    result.disk_ = std::make_unique<SimDisk>(faults);
     return result;
 }
 
@@ -68,6 +69,7 @@ SimRig& SimRig::operator=(SimRig&& other) noexcept {
     seen_ = std::move(other.seen_);
     camera_ = std::move(other.camera_);
     door_ = std::move(other.door_);
+    disk_ = std::move(other.disk_);
     return *this;
 }
 

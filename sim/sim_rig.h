@@ -9,6 +9,7 @@
 #include "sim/seen_lamps.h"
 #include "sim/sim_camera.h"
 #include "sim/sim_clock.h"
+#include "sim/sim_disk.h"
 #include "sim/sim_door.h"
 #include "sim/sim_lamps.h"
 
@@ -35,6 +36,7 @@ public:
     SimLamps& lamps() { return *lamps_; }
     SimCamera& camera() { return *camera_; }
     SimDoor& door() { return *door_; }
+    SimDisk& disk() { return *disk_; }
     const Scene& scene() const { return *scene_; }
 
     /// Ground truth of the scene and of every frame delivered so far; see sim/truth.h for the files.
@@ -49,6 +51,7 @@ private:
     std::unique_ptr<SeenLamps> seen_;  ///< what the camera sees instead
     std::unique_ptr<SimCamera> camera_;
     std::unique_ptr<SimDoor> door_;
+    std::unique_ptr<SimDisk> disk_;
 };
 
 }  // namespace darkbox::sim

@@ -9,6 +9,7 @@
 
 #include "acquisition/device/device_error.h"
 #include "acquisition/device/unique_fd.h"
+#include "acquisition/session/disk_fault.h"
 
 namespace darkbox {
 namespace {
@@ -18,6 +19,15 @@ namespace fs = std::filesystem;
 constexpr std::size_t largest_copy = std::size_t{4} << 30;
 
 fs::path parent_of(const fs::path& path) { return path.has_parent_path() ? path.parent_path() : fs::path("."); }
+
+void write_whole(int fd, std::span<const std::byte> bytes, const fs::path& path) {
+    while (!bytes.empty()) {
+        const ssize_t count = ::write(fd, bytes.data(), bytes.size());
+        if (count < 0 && errno == EINTR) continue;
+        if (count < 0) throw_errno("write", path.string(), errno);
+        bytes = bytes.subspan(static_cast<std::size_t>(count));
+    }
+}
 
 void write_and_flush(const fs::path& file, std::span<const std::byte> bytes) {
     const UniqueFd fd(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0644));
@@ -52,12 +62,11 @@ void make_folder_durably(const fs::path& folder) {
 }
 
 void write_all(int fd, std::span<const std::byte> bytes, const fs::path& path) {
-    while (!bytes.empty()) {
-        const ssize_t count = ::write(fd, bytes.data(), bytes.size());
-        if (count < 0 && errno == EINTR) continue;
-        if (count < 0) throw_errno("write", path.string(), errno);
-        bytes = bytes.subspan(static_cast<std::size_t>(count));
+    if (const int error = disk_fault_of(path); error != 0) {
+        if (error == ENOSPC) write_whole(fd, bytes.first(bytes.size() / 2), path);
+        throw_errno("write", path.string(), error);
     }
+    write_whole(fd, bytes, path);
 }
 
 void link_or_copy_durably(const fs::path& file, const fs::path& target) {

@@ -8,6 +8,7 @@
 #include "acquisition/camera/v4l2_camera.h"
 #include "acquisition/device/device_error.h"
 #include "acquisition/frame/error.h"
+#include "acquisition/session/disk_fault.h"
 #include "rig/capture/interlock.h"
 #include "rig/capture/timing_store.h"
 #include "rig/daemon/readiness.h"
@@ -73,6 +74,9 @@ public:
 
     CaptureOutcome capture(const CaptureRequest& request, const WorkContext& work) override {
         sim_ = sim::SimRig::make(rig_);  // its truth is of this capture alone, and its camera is cold
+        std::optional<FailingDisk> failing;
+        if (sim_.disk().has_faults())
+            failing.emplace(request.folder, [&disk = sim_.disk()] { return disk.next_write(); });
         Readiness readiness(rig_.health);
         const CaptureOutcome outcome =
             capture_with({lamps(), sim_.camera(), sim_.clock()}, door(), request, rig_, readiness, work);
