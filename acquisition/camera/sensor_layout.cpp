@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "acquisition/frame/error.h"
+#include "acquisition/frame/motion_jpeg.h"
 
 namespace darkbox {
 namespace {
@@ -54,6 +55,7 @@ constexpr std::array formats{
     SensorFormat{V4L2_PIX_FMT_RGB24, rgb8, 8, bytes},
     SensorFormat{V4L2_PIX_FMT_YUYV, ycc8, 8, bytes, video_black},
     SensorFormat{V4L2_PIX_FMT_NV12, ycc8, 8, luma_last, video_black},
+    SensorFormat{V4L2_PIX_FMT_MJPEG, mjpg, 16, jpeg},
 };
 
 constexpr const char* driver_hint = "the camera's driver is at fault: try another format of [camera]";
@@ -156,6 +158,8 @@ std::size_t row_bytes(const SensorFormat& format, int width) {
             return (pixels + 1) / 2 * 3;
         case bits10:
             return (10 * pixels + 7) / 8;
+        case jpeg:
+            return 0;
         case luma_last:
             return pixels;
         case bytes:
@@ -165,6 +169,8 @@ std::size_t row_bytes(const SensorFormat& format, int width) {
 }
 
 std::size_t payload_bytes(const SensorLayout& layout) {
+    constexpr std::size_t empty_jpeg = 4;  // where it begins and where it ends
+    if (layout.format.packing == jpeg) return empty_jpeg;
     const auto rows = static_cast<std::size_t>(layout.height);
     const std::size_t all_rows = layout.format.packing == luma_last ? rows + (rows + 1) / 2 : rows;
     return (all_rows - 1) * layout.bytes_per_line + row_bytes(layout.format, layout.width);
@@ -176,6 +182,8 @@ std::vector<std::byte> unpack(const SensorLayout& layout, std::span<const std::b
         throw InputError(fmt::format("{} of {} bytes of a {} x {} {} picture", payload.size(), payload_bytes(layout),
                                      layout.width, layout.height, fourcc_name(layout.format.fourcc)),
                          "check the camera's cable and the load on its bus");
+    if (layout.format.packing == jpeg)
+        return decode_motion_jpeg(payload, layout.width, layout.height, 0, layout.height);
     const auto pixels = static_cast<std::size_t>(layout.width);
     const auto rows = static_cast<std::size_t>(layout.height);
     const auto row = [&](std::size_t y) {

@@ -18,6 +18,7 @@ enum class Packing {
     mipi10,     ///< five bytes for four samples: their upper eight bits, then the lower two, sample 0 in bits 0 and 1
     mipi12,     ///< three bytes for two samples: their upper eight bits, then the lower four, sample 0 in bits 0 to 3
     bits10,     ///< ten bits each with no gap between them, the most significant first
+    jpeg,       ///< a JPEG, as long as it comes out
     luma_last,  ///< NV12: a plane of luma, then one of Cb, Cr pairs for two by two pixels
 };
 
@@ -50,7 +51,8 @@ struct SensorLayout {
 /// Bytes of one row without padding.
 std::size_t row_bytes(const SensorFormat& format, int width);
 
-/// Bytes from the buffer's begin to the last sample; the last row needs no padding.
+/// Bytes from the buffer's begin to the last sample; the last row needs no padding. Of a JPEG the fewest that may be
+/// one.
 std::size_t payload_bytes(const SensorLayout& layout);
 
 /// The samples as a Frame keeps them, without loss: NV12's rows of chroma are repeated, nothing is interpolated.

@@ -43,6 +43,16 @@ TimePoint stamp_of(const v4l2_buffer& buffer) {
                      std::chrono::microseconds(buffer.timestamp.tv_usec));
 }
 
+/// A JPEG that cannot be read lost bytes on its way.
+void decode(std::span<const std::byte> payload, const SensorLayout& layout, Frame& frame) {
+    try {
+        frame.pixels = unpack(layout, payload);
+        frame.jpeg.assign(payload.begin(), payload.end());
+    } catch (const InputError&) {
+        frame.status = FrameStatus::truncated;
+    }
+}
+
 bool same_picture(const CameraInfo& a, const CameraInfo& b) {
     return a.model == b.model && a.controls.exposure == b.controls.exposure && a.controls.gain == b.controls.gain;
 }
@@ -228,6 +238,8 @@ Frame V4l2Camera::frame_of(const v4l2_buffer& buffer) {
     const auto payload = stream_->payload(buffer);
     if (payload.size() < payload_bytes(mode.layout))
         frame.status = FrameStatus::truncated;
+    else if (mode.layout.format.packing == Packing::jpeg)
+        decode(payload, mode.layout, frame);
     else
         frame.pixels = unpack(mode.layout, payload);
     if ((buffer.flags & V4L2_BUF_FLAG_ERROR) != 0) frame.status = FrameStatus::error;

@@ -57,14 +57,18 @@ SensorFormat choose_format(VideoNode& node, const V4l2Options& options) {
                             (others.empty() ? "" : fmt::format("; not usable: {}", fmt::join(others, ", ")));
     if (options.format.empty()) {
         for (const SensorFormat& format : sensor_formats())
-            if (is_offered(format.fourcc)) return format;
-        throw InputError(fmt::format("{} has no picture format to measure with", node.path()), has);
+            if (format.packing != Packing::jpeg && is_offered(format.fourcc)) return format;
+        const bool compressed = is_offered(V4L2_PIX_FMT_MJPEG);
+        throw InputError(
+            fmt::format("{} has no picture format to measure with", node.path()),
+            compressed ? has + "; format = \"MJPG\" of [camera] takes its JPEGs, which are neither linear nor exact"
+                       : has);
     }
     const auto code = fourcc_from_name(options.format);
     const auto format = code ? sensor_format(*code) : std::nullopt;
     if (!format || !is_offered(*code))
         throw InputError(fmt::format("format is \"{}\", which {} of {}", options.format,
-                                     format ? "is none" : "is no uncompressed format", node.path()),
+                                     format ? "is none" : "is no format that darkbox can keep", node.path()),
                          has);
     return *format;
 }

@@ -36,6 +36,7 @@ struct Frame {
     int bit_depth = 16;             ///< significant bits of a sample; full scale is 2^bit_depth - 1
     double black_level = 0.0;       ///< in sample units
     std::vector<std::byte> pixels;  ///< height rows of width * channels samples, no padding
+    std::vector<std::byte> jpeg;    ///< of format mjpg: what the camera gave; `pixels` were decoded from it
 
     std::uint64_t sequence = 0;  ///< the driver's count; a gap means lost frames
     TimePoint timestamp;         ///< as the driver gave it

@@ -26,6 +26,7 @@ constexpr std::array rows{
     Row{PixelFormat::grbg16, "grbg16", 1, 2, Mosaic{0, 1}},
     Row{PixelFormat::gbrg16, "gbrg16", 1, 2, Mosaic{1, 0}},
     Row{PixelFormat::bggr16, "bggr16", 1, 2, Mosaic{1, 1}},
+    Row{PixelFormat::mjpg, "mjpg", 3, 2},
     Row{PixelFormat::ycc8, "ycc8", 2, 1},
 };
 

@@ -20,6 +20,7 @@ enum class PixelFormat {
     grbg16,
     gbrg16,
     bggr16,
+    mjpg,  ///< a JPEG of the camera's; its samples are R, G, B words of linear light, see motion_jpeg.h
     ycc8,  ///< luma and one chroma sample a pixel: Y Cb at even columns, Y Cr at odd ones (4:2:2); even widths only
 };
 

@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "acquisition/frame/error.h"
+#include "acquisition/frame/motion_jpeg.h"
+#include "acquisition/session/durable_file.h"
 #include "acquisition/session/tiff_handle.h"
 
 namespace darkbox {
@@ -18,6 +20,7 @@ namespace fs = std::filesystem;
 static_assert(std::endian::native == std::endian::little, "Frame samples are little-endian words");
 
 constexpr std::size_t strip_bytes = 64 * 1024;
+constexpr std::size_t largest_jpeg = std::size_t{256} << 20;
 
 std::size_t row_bytes(int width, PixelFormat format) {
     return static_cast<std::size_t>(width) * channels(format) * bytes_per_sample(format);
@@ -31,6 +34,8 @@ void require_sound(const Frame& frame) {
                                      frame.height, name(frame.format), frame.pixels.size(), expected),
                          "the camera driver delivered an incomplete frame; take it again");
     const int most = 8 * bytes_per_sample(frame.format);
+    if (frame.format == PixelFormat::mjpg && frame.jpeg.empty())
+        throw InputError("a frame of format mjpg without its JPEG", "the camera driver is at fault; take it again");
     if (frame.bit_depth < 1 || frame.bit_depth > most)
         throw InputError(
             fmt::format("bit_depth {} of a {} frame; allowed are 1 to {}", frame.bit_depth, name(frame.format), most),
@@ -118,7 +123,26 @@ Frame frame_of(const FrameRecord& record, PixelFormat format, RowBand band) {
     return frame;
 }
 
+Frame read_jpeg(const fs::path& file, const FrameRecord& record, RowBand band) {
+    const std::string bytes = read_text(file, largest_jpeg);
+    Frame frame = frame_of(record, PixelFormat::mjpg, band);
+    try {
+        frame.pixels = decode_motion_jpeg(bytes_of(bytes), record.width, record.height, band.first, band.count);
+    } catch (const InputError& error) {
+        throw_damaged(file, error.what());
+    }
+    const auto whole = bytes_of(bytes);
+    frame.jpeg.assign(whole.begin(), whole.end());
+    return frame;
+}
+
 }  // namespace
+
+std::vector<std::byte> encode_frame(const Frame& frame) {
+    if (frame.format != PixelFormat::mjpg) return encode_frame_tiff(frame);
+    require_sound(frame);
+    return frame.jpeg;
+}
 
 std::vector<std::byte> encode_frame_tiff(const Frame& frame) {
     require_sound(frame);
@@ -148,6 +172,7 @@ Frame read_frame(const fs::path& file, const FrameRecord& record) {
 Frame read_frame_rows(const fs::path& file, const FrameRecord& record, RowBand band) {
     const PixelFormat format = captured_format(file, record);
     require_inside(file, record, band);
+    if (format == PixelFormat::mjpg) return read_jpeg(file, record, band);
     TiffMessages messages;
     const TiffHandle tiff = open_tiff(file, messages);
     if (!tiff) throw_damaged(file, messages.first_error.empty() ? "it is not a TIFF" : messages.first_error);

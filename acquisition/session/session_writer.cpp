@@ -106,7 +106,7 @@ void tidy_sealed(const fs::path& folder) {
 }
 
 /// "frames/0003_lamp-04.tif"
-std::string frame_name(std::size_t number, const FrameRecord& record) {
+std::string frame_name(std::size_t number, const FrameRecord& record, PixelFormat format) {
     constexpr std::size_t longest = 64;
     std::string label = record.lamp_name.empty() ? std::string(name(record.kind)) : record.lamp_name;
     label.resize(std::min(label.size(), longest));
@@ -114,7 +114,7 @@ std::string frame_name(std::size_t number, const FrameRecord& record) {
         return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
     };
     std::replace_if(label.begin(), label.end(), [&](char c) { return !is_plain(c); }, '-');
-    return fmt::format("frames/{:04}_{}.tif", number, label);
+    return fmt::format("frames/{:04}_{}.{}", number, label, frame_extension(format));
 }
 
 FrameRecord record_of(const Frame& frame, FrameRecord record) {
@@ -206,8 +206,8 @@ const std::vector<FrameRecord>& SessionWriter::acknowledged() const { return sta
 void SessionWriter::add(const Frame& frame, FrameRecord record) {
     if (frame.status != FrameStatus::good)
         throw InputError(fmt::format("frame {} of the camera is damaged", frame.sequence), "take it again");
-    if (record.file.empty()) record.file = frame_name(state_->contents.frames.size(), record);
-    add(encode_frame_tiff(frame), record_of(frame, std::move(record)));
+    if (record.file.empty()) record.file = frame_name(state_->contents.frames.size(), record, frame.format);
+    add(encode_frame(frame), record_of(frame, std::move(record)));
 }
 
 void SessionWriter::add(std::span<const std::byte> bytes, FrameRecord record) {

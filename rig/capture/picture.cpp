@@ -1,6 +1,7 @@
 #include "rig/capture/picture.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
@@ -51,9 +52,30 @@ Picture luma_of(const Frame& frame) {
     return picture;
 }
 
+/// A JPEG keeps of its noise what a block of 8 x 8 pixels has in common, in all colours at once: so much is one sample.
+Picture blocks_of_jpeg(const Frame& frame) {
+    constexpr int side = 8;
+    Picture picture{frame.width / side, frame.height / side, {}};
+    std::vector<double> light(static_cast<std::size_t>(picture.columns));
+    std::array<std::uint16_t, 3> rgb{};
+    for (int row = 0; row < picture.rows; ++row) {
+        std::fill(light.begin(), light.end(), 0.0);
+        for (int y = row * side; y < (row + 1) * side; ++y)
+            for (int x = 0; x < picture.columns * side; ++x) {
+                const std::size_t pixel =
+                    static_cast<std::size_t>(y) * static_cast<std::size_t>(frame.width) + static_cast<std::size_t>(x);
+                std::memcpy(rgb.data(), frame.pixels.data() + pixel * sizeof rgb, sizeof rgb);
+                light[static_cast<std::size_t>(x / side)] += 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+            }
+        for (const double sum : light) picture.samples.push_back(static_cast<std::uint16_t>(sum / (side * side)));
+    }
+    return picture;
+}
+
 }  // namespace
 
 Picture to_picture(const Frame& frame) {
+    if (frame.format == PixelFormat::mjpg) return blocks_of_jpeg(frame);
     if (frame.format == PixelFormat::ycc8) return luma_of(frame);
     Picture picture{frame.width * channels(frame.format), frame.height, {}};
     const std::size_t count = static_cast<std::size_t>(picture.columns) * static_cast<std::size_t>(picture.rows);

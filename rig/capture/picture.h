@@ -8,7 +8,7 @@
 namespace darkbox {
 
 /// A frame's samples in one width, rows of `columns` samples: colours of a pixel are columns of their own; of
-/// ycc8 the luma alone.
+/// ycc8 the luma alone; of mjpg one sample of luma for each of the JPEG's blocks.
 struct Picture {
     int columns = 0;
     int rows = 0;

@@ -166,8 +166,10 @@ TEST_F(VividCamera, AgreesOnWhatItHasAndNamesWhatItHasNot) {
 
     wanted.frame_rate = 13;
     EXPECT_THAT(refusal(wanted), HasSubstr("frame_rate is 13, but"));
+    wanted = options("H264");
+    EXPECT_THAT(refusal(wanted), HasSubstr("no format that darkbox can keep"));
     wanted = options("MJPG");
-    EXPECT_THAT(refusal(wanted), HasSubstr("no uncompressed format"));
+    EXPECT_THAT(refusal(wanted), HasSubstr("\"MJPG\", which is none of"));
     wanted = options("Y10P");
     EXPECT_THAT(refusal(wanted), HasSubstr("the camera has YUYV, NV12, GREY, Y10, Y12, Y16, RGB3, BA81"));
     wanted = options();

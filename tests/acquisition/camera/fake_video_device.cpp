@@ -23,6 +23,11 @@ std::uint32_t line_of(std::uint32_t fourcc, std::uint32_t width) {
     return format ? static_cast<std::uint32_t>(row_bytes(*format, static_cast<int>(width))) : width;
 }
 
+/// Room enough for a JPEG, too, which has no lines.
+std::uint32_t image_bytes(std::uint32_t line, std::uint32_t width, std::uint32_t height) {
+    return std::max(line, 2 * width) * height * 2;
+}
+
 }  // namespace
 
 int FakeVideoDevice::open(const std::string& asked) {
@@ -189,7 +194,7 @@ int FakeVideoDevice::set_format(v4l2_format& format) {
     pix.height = height_;
     pix.field = V4L2_FIELD_NONE;
     pix.bytesperline = line_of(fourcc_, width_) + padding;
-    pix.sizeimage = pix.bytesperline * height_ * 2;
+    pix.sizeimage = image_bytes(pix.bytesperline, width_, height_);
     return 0;
 }
 
@@ -238,7 +243,7 @@ int FakeVideoDevice::set_control(const v4l2_control& control) {
 int FakeVideoDevice::request_buffers(v4l2_requestbuffers& request) {
     if (streaming_) return EBUSY;
     if (std::any_of(buffers_.begin(), buffers_.end(), [](const Buffer& b) { return b.mapped; })) return EBUSY;
-    const std::size_t size = std::size_t{line_of(fourcc_, width_) + padding} * height_ * 2;
+    const std::size_t size = image_bytes(line_of(fourcc_, width_) + padding, width_, height_);
     buffers_.assign(request.count, Buffer{std::vector<std::byte>(size)});
     return 0;
 }

@@ -106,9 +106,19 @@ TEST_F(V4l2CameraTest, FormatsThatTheCameraLacksAreRefused) {
     EXPECT_THAT(failure<InputError>([&] { camera().configure({}); }), HasSubstr("\"GREY\", which is none of"));
 }
 
-TEST_F(V4l2CameraTest, CompressedFormatsAreRefused) {
+TEST_F(V4l2CameraTest, FormatsThatNobodyCanKeepAreRefused) {
+    options.format = "H264";
+    EXPECT_THAT(failure<InputError>([&] { camera().configure({}); }), HasSubstr("no format that darkbox can keep"));
+}
+
+TEST_F(V4l2CameraTest, JpegsAreTakenWhereTheyAreAskedFor) {
     options.format = "MJPG";
-    EXPECT_THAT(failure<InputError>([&] { camera().configure({}); }), HasSubstr("no uncompressed format"));
+    const CameraInfo info = camera().configure({});
+    EXPECT_EQ(info.format, PixelFormat::mjpg);
+    EXPECT_EQ(info.bit_depth, 16);
+    camera().start();
+    EXPECT_EQ(next().status, FrameStatus::truncated) << "the stand-in's bytes are no JPEG";
+    camera().stop();
 }
 
 TEST_F(V4l2CameraTest, SizesThatTheCameraLacksAreRefused) {
