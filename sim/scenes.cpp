@@ -67,9 +67,21 @@ Shapes relief() {
     return {posed(std::move(mesh), pose)};
 }
 
+/// A plane in the object's place, wide enough for the middle of the picture.
+Shapes card() {
+    HeightField field;
+    field.width_mm = 150.0;
+    field.height_mm = 130.0;
+    field.height = [](double, double) { return 0.0; };
+    TriangleMesh mesh = height_field_mesh(field, 8);
+    Pose pose;
+    pose.shift = object_centre;
+    return {posed(std::move(mesh), pose)};
+}
+
 const std::map<std::string, std::function<Shapes()>>& shape_makers() {
     static const std::map<std::string, std::function<Shapes()>> makers{
-        {"sphere", sphere}, {"torus", torus}, {"teapot", teapot}, {"relief", relief}};
+        {"sphere", sphere}, {"torus", torus}, {"teapot", teapot}, {"relief", relief}, {"card", card}};
     return makers;
 }
 

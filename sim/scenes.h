@@ -8,7 +8,7 @@
 
 namespace darkbox::sim {
 
-/// The scene that `sim.scene` names: a shape (sphere, torus, teapot, relief) and a texture (lambert, stone, moss,
+/// The scene that `sim.scene` names: a shape (sphere, torus, teapot, relief, card) and a texture (lambert, stone, moss,
 /// marble, speckle, brick, weave, print, melon; lambert when none is named) joined by "-" in either order, and any of
 /// the suffixes "near" (near lamps with 1/d^2), "perspective", "twoballs" and "threeballs": "brick-torus",
 /// "teapot-moss-near". A material may be named as well: "phong60n30" has Phong's highlight of strength 0.60 (a white

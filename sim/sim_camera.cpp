@@ -62,7 +62,7 @@ CameraInfo SimCamera::configure(const CameraConfig& config) {
 
     CameraInfo info;
     info.model = "darkbox simulated camera";
-    info.id = "sim:" + scene_.name;
+    info.id = "sim";  // whatever stands before it
     info.driver = "sim";
     info.width = scene_.view.width;
     info.height = scene_.view.height;

@@ -133,15 +133,18 @@ void require_valid(const std::string& where, const CaptureGeometry& geometry) {
     }
 }
 
+void require_valid(const std::string& where, const char* field, const SessionReference& reference) {
+    if (!is_good_component(reference.name))
+        refuse(where, field, shown(reference.name), "the name of a session's folder");
+    require_sha256(where, reference.manifest_sha256);
+}
+
 void require_valid(const std::string& where, const SessionInfo& info) {
     require_between(where, "schema_version", info.schema_version, session_schema, session_schema);
     require_between(where, "planned_shots", info.planned_shots, 0, most_shots);
     if (info.geometry) require_valid(where, *info.geometry);
-    if (info.retakes) {
-        if (!is_good_component(info.retakes->name))
-            refuse(where, "retakes", shown(info.retakes->name), "the name of a session's folder");
-        require_sha256(where, info.retakes->manifest_sha256);
-    }
+    if (info.retakes) require_valid(where, "retakes", *info.retakes);
+    if (info.flats) require_valid(where, "flats", *info.flats);
     require_valid(where, info.record);
 }
 

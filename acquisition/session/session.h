@@ -110,6 +110,7 @@ struct SessionInfo {
     std::vector<std::string> notes;  ///< choices made on the way in, such as the transfer curve, in words
     std::optional<CaptureGeometry> geometry = {};
     std::optional<SessionReference> retakes = {};  ///< the session of which this one takes some lamps again
+    std::optional<SessionReference> flats = {};    ///< the session that its flat frames were taken over from
     ObjectRecord record = {};                      ///< of the object
 };
 

@@ -145,13 +145,17 @@ Json json_of(const CaptureGeometry& geometry) {
     return json;
 }
 
+Json json_of(const SessionReference& reference) {
+    return {{"session", reference.name}, {"manifest_sha256", reference.manifest_sha256}};
+}
+
 Json json_of(const SessionInfo& info) {
     Json json{{"object", info.object}, {"created", info.created}, {"source", info.source},
               {"rig", info.rig},       {"camera", info.camera},   {"planned_shots", info.planned_shots},
               {"notes", info.notes}};
     if (info.geometry) json["geometry"] = json_of(*info.geometry);
-    if (info.retakes)
-        json["retakes"] = {{"session", info.retakes->name}, {"manifest_sha256", info.retakes->manifest_sha256}};
+    if (info.retakes) json["retakes"] = json_of(*info.retakes);
+    if (info.flats) json["flats"] = json_of(*info.flats);
     if (!info.record.inventory.empty()) json["inventory"] = info.record.inventory;
     if (!info.record.dublin_core.empty()) json["dublin_core"] = info.record.dublin_core;
     return json;
@@ -222,6 +226,12 @@ ObjectRecord object_record_from(const Fields& fields) {
     return record;
 }
 
+std::optional<SessionReference> reference_from(const Fields& fields, const char* key) {
+    if (!fields.has(key)) return std::nullopt;
+    const Fields reference(fields.where(), fields.member(key));
+    return SessionReference{reference.text("session"), reference.text("manifest_sha256")};
+}
+
 SessionInfo info_from(const Fields& fields) {
     SessionInfo info;
     info.object = fields.text("object");
@@ -233,10 +243,8 @@ SessionInfo info_from(const Fields& fields) {
     info.notes = fields.texts("notes");
     info.record = object_record_from(fields);
     if (fields.has("geometry")) info.geometry = geometry_from({fields.where(), fields.member("geometry")});
-    if (fields.has("retakes")) {
-        const Fields reference(fields.where(), fields.member("retakes"));
-        info.retakes = {reference.text("session"), reference.text("manifest_sha256")};
-    }
+    info.retakes = reference_from(fields, "retakes");
+    info.flats = reference_from(fields, "flats");
     require_valid(fields.where(), info);
     return info;
 }

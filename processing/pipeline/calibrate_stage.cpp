@@ -232,6 +232,9 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
     options.calibration.validate();
     const ResultFiles files(session.folder());
     const std::vector<FrameRecord> lit = photographs_of(session, FrameKind::lit);
+    if (lit.empty())
+        throw InputError(fmt::format("{} shows no object: it has no frame of kind lit", session.folder().string()),
+                         "flat frames go along with an object's: darkbox capture --flats-from SESSION");
     CalibrateSummary summary;
     Stopwatch watch;
     const bool ball_asked_for = !options.calibration.balls.empty() || options.ball_mask;

@@ -49,7 +49,7 @@ void check_exposure(Seconds exposure, const RigDescription& rig, const std::vect
 
 class PlanMaker {
 public:
-    explicit PlanMaker(const RigDescription& rig) : rig_(rig) {}
+    PlanMaker(const RigDescription& rig, FrameKind kind) : rig_(rig), kind_(kind) {}
 
     void add_part(Seconds exposure, const std::vector<LampId>& lamps, bool closes) {
         camera_ = {exposure, rig_.camera.gain};
@@ -68,13 +68,14 @@ public:
 private:
     void add(std::optional<LampId> lamp) {
         const FrameKind off = rig_.capture.ambient ? FrameKind::ambient : FrameKind::dark;
-        Shot shot{lamp ? FrameKind::lit : off, lamp, camera_, ""};
+        Shot shot{lamp ? kind_ : off, lamp, camera_, "", rig_.camera.format == "MJPG" ? "jpg" : "tif"};
         const std::string label = lamp ? rig_.lamps.at(lamp->value).name : std::string(darkbox::name(off));
         shot.name = fmt::format("{:04}_{}", plan_.shots.size(), label);
         plan_.shots.push_back(std::move(shot));
     }
 
     const RigDescription& rig_;
+    const FrameKind kind_;
     CameraConfig camera_;
     CapturePlan plan_;
 };
@@ -90,9 +91,9 @@ std::vector<LampId> lamps_named(const RigDescription& rig, const std::vector<std
     return lamps;
 }
 
-CapturePlan plan_capture(const RigDescription& rig, const std::vector<std::string>& names) {
+CapturePlan plan_capture(const RigDescription& rig, const std::vector<std::string>& names, FrameKind kind) {
     const std::vector<LampId> lamps = lamps_named(rig, names);
-    PlanMaker maker(rig);
+    PlanMaker maker(rig, kind);
     const std::vector<double>& brackets = rig.capture.brackets;
     for (std::size_t i = 0; i < brackets.size(); ++i) {
         const Seconds exposure = brackets[i] * rig.camera.exposure;

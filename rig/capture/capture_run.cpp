@@ -50,7 +50,7 @@ void validate(const CapturePlan& plan, const RigDescription& rig, const LampArra
             "correct [[lamps.lamp]] of rig.toml");
     if (plan.shots.empty()) throw InputError("the capture plan has no shots", "plan at least one lamp");
     for (const Shot& shot : plan.shots) {
-        const bool lit = shot.kind == FrameKind::lit;
+        const bool lit = shot.kind == FrameKind::lit || shot.kind == FrameKind::flat;
         const bool unlit = shot.kind == FrameKind::dark || shot.kind == FrameKind::ambient;
         if ((!lit && !unlit) || lit != shot.lamp.has_value())
             throw InputError(fmt::format("shot {} is neither dark nor of one lamp", shot.name),

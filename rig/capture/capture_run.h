@@ -28,9 +28,10 @@ std::vector<LampId> lamps_named(const RigDescription& rig, const std::vector<std
 /// For each of rig.capture.brackets: a frame without a lamp, every lamp as often as rig.capture.averages says, pass
 /// after pass so that what drifts drifts in all of them, a frame without a lamp between as rig.capture.dark_every says,
 /// and one at the end. The first lamp once more where rig.capture.closing_repeat says so. `lamps`: names to capture;
-/// empty = all. Throws InputError that names an unknown lamp and the known ones, or an exposure that a lamp does not
-/// bear or that is no whole number of flicker periods.
-CapturePlan plan_capture(const RigDescription& rig, const std::vector<std::string>& lamps = {});
+/// empty = all. `kind`: lit, or flat, of a card in the object's place. Throws InputError that names an unknown lamp and
+/// the known ones, or an exposure that a lamp does not bear or that is no whole number of flicker periods.
+CapturePlan plan_capture(const RigDescription& rig, const std::vector<std::string>& lamps = {},
+                         FrameKind kind = FrameKind::lit);
 
 struct CaptureSummary {
     int taken = 0;     ///< shots acknowledged by this run

@@ -31,6 +31,10 @@ struct CaptureRequest {
     /// A sealed session of which `lamps` are taken again: the new one refers to it and takes the rest over.
     std::optional<std::filesystem::path> retake = {};
     ObjectRecord record = {};  ///< of the object; a resumed session keeps its own
+    /// lit; or flat, of a grey or white card that lies in the object's place. A resumed session keeps its own.
+    FrameKind kind = FrameKind::lit;
+    /// A sealed session of kind flat whose frames of `lamps` go along; they tell the lamps' intensities.
+    std::optional<std::filesystem::path> flats = {};
     CaptureListener listener = {};
     ReviewSession review = {};            ///< of the whole session before it is sealed; empty: none
     std::vector<std::string> notes = {};  ///< what the session is to keep of how it began

@@ -14,8 +14,14 @@ constexpr Seconds kept_every{1.0};
 }  // namespace
 
 DosedLamps::DosedLamps(LampArray& lamps, Clock& clock, const RigDescription& rig, DoseBook& book, std::string object,
-                       std::string session)
-    : lamps_(lamps), clock_(clock), rig_(rig), book_(book), object_(std::move(object)), session_(std::move(session)) {}
+                       std::string session, const LightDose& before)
+    : lamps_(lamps),
+      clock_(clock),
+      rig_(rig),
+      book_(book),
+      object_(std::move(object)),
+      session_(std::move(session)),
+      given_(before) {}
 
 DosedLamps::~DosedLamps() {
     try {

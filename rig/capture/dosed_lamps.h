@@ -15,9 +15,9 @@ namespace darkbox {
 /// previews. Refuses a lamp whose light would be too much. Thread-compatible.
 class DosedLamps final : public LampArray, public StrobedLamps {
 public:
-    /// All references must outlive this.
+    /// All references must outlive this. `before`: what the capture gave already and the book knows.
     DosedLamps(LampArray& lamps, Clock& clock, const RigDescription& rig, DoseBook& book, std::string object,
-               std::string session);
+               std::string session, const LightDose& before = {});
     DosedLamps(const DosedLamps&) = delete;
     DosedLamps& operator=(const DosedLamps&) = delete;
     /// Keeps what is not kept yet, as far as the disk takes it.

@@ -35,22 +35,19 @@ void require_same_rig(const Session& old, const RigDescription& rig) {
     if (old.info().source != "capture")
         throw InputError(fmt::format("{} was imported, not captured", old.folder().string()),
                          "take its photographs again with their own camera, and import them");
-    if (old.info().rig != rig.name)
-        refuse(old, fmt::format("it was captured by rig '{}', and this is '{}'", old.info().rig, rig.name));
-    if (old.info().geometry != geometry_of(rig))
-        refuse(old, "the rig's lamps, ball or camera stand elsewhere by its description");
-    const RigDescription then = load_rig(old.path_of_extra("rig.toml"));
-    const bool same = std::ranges::equal(then.lamps, rig.lamps,
-                                         [](const auto& a, const auto& b) { return output_of(a) == output_of(b); });
-    if (!same || then.lamps_driver != rig.lamps_driver) refuse(old, "the rig's lamps hang on other outputs");
-    const bool ambient = std::ranges::any_of(old.frames(), [](const auto& f) { return f.kind == FrameKind::ambient; });
-    if (ambient != rig.capture.ambient) refuse(old, "it was captured with another `ambient` of [capture]");
+    if (const auto difference = difference_from(old, rig)) refuse(old, *difference);
+}
+
+/// Of the frames that the session is of: of an object, or, where it shows a card alone, flat.
+FrameKind lit_kind_of(const Session& old) {
+    const bool lit = std::ranges::any_of(old.frames(), [](const auto& f) { return f.kind == FrameKind::lit; });
+    return lit ? FrameKind::lit : FrameKind::flat;
 }
 
 std::vector<std::string> unverified_lamps(const Session& old) {
     std::vector<std::string> names;
     for (const FrameRecord& record : old.frames())
-        if (record.kind == FrameKind::lit && !record.verified &&
+        if (record.kind == lit_kind_of(old) && !record.verified &&
             std::ranges::find(names, record.lamp_name) == names.end())
             names.push_back(record.lamp_name);
     if (names.empty())
@@ -64,7 +61,7 @@ std::set<std::string> checked_lamps(const Session& old, const RigDescription& ri
     (void)lamps_named(rig, names);
     std::set<std::string> held;
     for (const FrameRecord& record : old.frames())
-        if (record.kind == FrameKind::lit) held.insert(record.lamp_name);
+        if (record.kind == lit_kind_of(old)) held.insert(record.lamp_name);
     for (const std::string& name : names)
         if (!held.contains(name))
             throw InputError(fmt::format("{} has no frame of lamp '{}'", old.folder().string(), name),
@@ -90,6 +87,20 @@ private:
 
 }  // namespace
 
+std::optional<std::string> difference_from(const Session& old, const RigDescription& rig) {
+    if (old.info().rig != rig.name)
+        return fmt::format("it was captured by rig '{}', and this is '{}'", old.info().rig, rig.name);
+    if (old.info().geometry != geometry_of(rig))
+        return "the rig's lamps, ball or camera stand elsewhere by its description";
+    const RigDescription then = load_rig(old.path_of_extra("rig.toml"));
+    const bool same = std::ranges::equal(then.lamps, rig.lamps,
+                                         [](const auto& a, const auto& b) { return output_of(a) == output_of(b); });
+    if (!same || then.lamps_driver != rig.lamps_driver) return "the rig's lamps hang on other outputs";
+    const bool ambient = std::ranges::any_of(old.frames(), [](const auto& f) { return f.kind == FrameKind::ambient; });
+    if (ambient != rig.capture.ambient) return "it was captured with another `ambient` of [capture]";
+    return std::nullopt;
+}
+
 std::string identity_of(const CameraInfo& camera) {
     return camera.id.empty() ? camera.model : fmt::format("{} ({})", camera.model, camera.id);
 }
@@ -98,12 +109,17 @@ Retake plan_retake(const Session& old, const RigDescription& rig, const std::vec
     require_same_rig(old, rig);
     const std::set<std::string> wanted = checked_lamps(old, rig, lamps);
     Retake retake{.of = old.reference(), .plan = {}, .taken_over = {}, .files = {}, .order = {}};
+    const FrameKind kind = lit_kind_of(old);
     const auto is_retaken = [&](const FrameRecord& record) {
-        return record.kind == FrameKind::lit && wanted.contains(record.lamp_name);
+        return record.kind == kind && wanted.contains(record.lamp_name);
     };
     FreshNames names(old);
     const auto add = [&](const FrameRecord& like, const FrameRecord& part, std::string name) {
-        Shot shot{like.kind, like.lamp, {Seconds(part.exposure_s), part.gain}, std::move(name)};
+        Shot shot{like.kind,
+                  like.lamp,
+                  {Seconds(part.exposure_s), part.gain},
+                  std::move(name),
+                  fs::path(like.file).extension().string().substr(1)};
         retake.order.push_back(file_of(shot));
         retake.plan.shots.push_back(std::move(shot));
     };

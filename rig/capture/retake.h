@@ -28,6 +28,10 @@ Retake plan_retake(const Session& old, const RigDescription& rig, const std::vec
 /// format, depth, black level), or the session's exposure and gain, `asked`, do not come out as they were.
 void require_same_camera(const Session& old, const CameraInfo& camera, const CameraConfig& asked);
 
+/// How the rig of a captured session differs from this one, in words: its name, its lamps and their outputs, the
+/// geometry, whether the room's light is kept out.
+std::optional<std::string> difference_from(const Session& old, const RigDescription& rig);
+
 /// "model (id)": how a session names a camera.
 std::string identity_of(const CameraInfo& camera);
 

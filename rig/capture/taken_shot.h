@@ -13,13 +13,14 @@ namespace darkbox {
 /// One picture to take.
 struct Shot {
     FrameKind kind = FrameKind::lit;
-    std::optional<LampId> lamp;  ///< of a lit shot; the others are dark or ambient
+    std::optional<LampId> lamp;  ///< of a lit or flat shot; the others are dark or ambient
     CameraConfig camera;
-    std::string name;  ///< of the file: "0003_lamp-04"
+    std::string name;               ///< of the file: "0003_lamp-04"
+    std::string extension = "tif";  ///< jpg of a camera that gives JPEGs
 };
 
 /// Its place in the session.
-inline std::string file_of(const Shot& shot) { return "frames/" + shot.name + ".tif"; }
+inline std::string file_of(const Shot& shot) { return "frames/" + shot.name + "." + shot.extension; }
 
 /// A proven picture of a shot.
 struct TakenShot {

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "acquisition/device/device_error.h"
+#include "rig/capture/flat_frames.h"
 #include "rig/cli/capture_series.h"
 #include "rig/cli/followed_job.h"
 #include "rig/cli/object_options.h"
@@ -31,6 +32,7 @@ struct CaptureArguments {
     std::string plan = "all";
     std::string mode;      ///< empty: the rig's own
     std::string exposure;  ///< "auto" or microseconds; empty: the rig's own
+    fs::path flats_from;
     fs::path retake;
     fs::path resume;
     fs::path out;
@@ -40,6 +42,14 @@ struct CaptureArguments {
     std::string between;  ///< command; empty: none
     int between_timeout_s = 60;
 };
+
+FrameKind kind_of(const CaptureArguments& a) { return a.plan == "flat" ? FrameKind::flat : FrameKind::lit; }
+
+/// What a session without a name is called after.
+std::string label_of(const CaptureArguments& a) {
+    if (!a.object.empty()) return a.object;
+    return kind_of(a) == FrameKind::flat ? flat_object : a.retake.filename().string();
+}
 
 /// "auto", or microseconds; none for an empty text.
 std::optional<ExposureChoice> exposure_of(const std::string& text) {
@@ -84,14 +94,16 @@ CaptureRequest request_for(const CaptureArguments& a) {
     request.exposure = exposure_of(a.exposure);
     request.record = object_record(a.about);
     const fs::path folder = default_sessions_folder();
-    if (!a.retake.empty()) request.retake = fs::exists(a.retake) ? a.retake : folder / a.retake;
+    request.kind = kind_of(a);
+    const auto found = [&](const fs::path& session) { return fs::exists(session) ? session : folder / session; };
+    if (!a.retake.empty()) request.retake = found(a.retake);
+    if (!a.flats_from.empty()) request.flats = found(a.flats_from);
     if (!a.resume.empty()) {
         request.start = CaptureStart::resume;
-        request.folder = fs::exists(a.resume) ? a.resume : folder / a.resume;
+        request.folder = found(a.resume);
     } else if (a.out.empty()) {
         fs::create_directories(folder);
-        const std::string label = a.object.empty() ? a.retake.filename().string() : a.object;
-        request.folder = folder / fresh_session_name(folder, label, std::chrono::system_clock::now());
+        request.folder = folder / fresh_session_name(folder, label_of(a), std::chrono::system_clock::now());
     }
     return request;
 }
@@ -133,11 +145,13 @@ CaptureOrder order_for(const CaptureArguments& a, const DaemonClient& client) {
     CaptureOrder order{.object = a.object, .lamps = lamps_of_plan(a.plan), .mode = sync_mode_from_name(a.mode)};
     order.exposure = exposure_of(a.exposure);
     order.record = object_record(a.about);
-    if (a.out.empty() && a.resume.empty() && a.retake.empty()) return order;
+    order.kind = kind_of(a);
+    if (a.out.empty() && a.resume.empty() && a.retake.empty() && a.flats_from.empty()) return order;
     const std::string folder = client.call("GET", "status").at("sessions");
     if (!a.resume.empty()) order.resume = name_in_folder(a.resume, folder);
     if (!a.out.empty()) order.name = name_in_folder(a.out, folder);
     if (!a.retake.empty()) order.retake = name_in_folder(a.retake, folder);
+    if (!a.flats_from.empty()) order.flats_from = name_in_folder(a.flats_from, folder);
     return order;
 }
 
@@ -197,7 +211,7 @@ CommandResult capture_all(const CaptureArguments& a, const fs::path& sessions, C
     if (!a.between.empty()) series.between = Hook{split_words(a.between), std::chrono::seconds(a.between_timeout_s)};
     // A name made of object and moment goes into the usual folder; the daemon takes names in its own.
     fs::path base = a.out;
-    if (base.empty()) base = sessions / fresh_session_name(sessions, a.object, std::chrono::system_clock::now());
+    if (base.empty()) base = sessions / fresh_session_name(sessions, label_of(a), std::chrono::system_clock::now());
     const auto into = [&](const fs::path& session) {
         CaptureArguments one = a;
         one.out = session;
@@ -210,12 +224,17 @@ CommandResult run(const CaptureArguments& a, const WorkContext& work) {
     if (!a.resume.empty() && !(a.out.empty() && a.object.empty() && a.about.empty()))
         throw InputError("a resumed session keeps its name and its object",
                          "leave out --out, --object, --inventory and --meta");
-    if (!a.resume.empty() && !(a.retake.empty() && a.exposure.empty()))
-        throw InputError("a resumed session keeps its plan and its exposure", "leave out --retake and --exposure");
-    if (!a.retake.empty() && !a.exposure.empty())
-        throw InputError("a re-take keeps its session's exposure", "leave out --exposure");
-    if (a.plan == "recalibrate" &&
-        (!a.retake.empty() || !a.exposure.empty() || a.standalone || !a.resume.empty() || !a.out.empty()))
+    const bool flat = kind_of(a) == FrameKind::flat;
+    if (!a.resume.empty() && !(a.retake.empty() && a.exposure.empty() && a.flats_from.empty() && !flat))
+        throw InputError("a resumed session keeps its plan and its exposure",
+                         "leave out --retake, --exposure, --flats-from and --plan flat");
+    if (!a.retake.empty() && !(a.exposure.empty() && a.flats_from.empty() && !flat))
+        throw InputError("a re-take keeps its session's exposure and flat frames",
+                         "leave out --exposure, --flats-from and --plan flat");
+    if (flat && !a.flats_from.empty())
+        throw InputError("flat frames are taken, and taken over, at once", "leave out --flats-from or --plan flat");
+    if (a.plan == "recalibrate" && (!a.retake.empty() || !a.exposure.empty() || a.standalone || !a.resume.empty() ||
+                                    !a.out.empty() || !a.flats_from.empty()))
         throw InputError("--plan recalibrate is darkboxd's to do, as a whole", "leave out the other options");
     if (a.repeat == 1 && !a.between.empty())
         throw InputError("--between runs between captures, and there is one", "give --repeat N");
@@ -240,7 +259,7 @@ CommandResult run(const CaptureArguments& a, const WorkContext& work) {
 
 std::vector<std::string> lamps_of_plan(const std::string& plan) {
     std::vector<std::string> lamps;
-    if (plan == "all") return lamps;
+    if (plan == "all" || plan == "flat") return lamps;
     std::istringstream names(plan);
     for (std::string name; std::getline(names >> std::ws, name, ',');) {
         while (name.ends_with(' ')) name.pop_back();
@@ -266,6 +285,7 @@ void add_capture_command(CommandLine& line) {
         line.add("capture", "Capture an object lamp by lamp, through darkboxd or in this process",
                  "darkbox capture --object vase --inventory 1907.12 --meta title=\"A vase\" --meta creator=\"A "
                  "potter\"\n  darkbox capture --out vase --repeat 24 --between \"./turn.sh 15\"\n  "
+                 "darkbox capture --plan flat --out card && darkbox capture --object vase --flats-from card\n  "
                  "darkbox capture --retake vase --lamps lamp-03 --out vase-2\n  "
                  "darkbox capture --standalone --rig rig.toml --out vase",
                  [a](const WorkContext& work) { return run(*a, work); });
@@ -275,7 +295,12 @@ void add_capture_command(CommandLine& line) {
         ->excludes(rig);
     command.add_option("--object", a->object, "Name of the object");
     add_object_options(command, a->about);
-    command.add_option("--plan,--lamps", a->plan, "all, names of lamps between commas, or recalibrate");
+    command.add_option("--plan,--lamps", a->plan,
+                       "all, names of lamps between commas, recalibrate, or flat: frames of a grey or white card in "
+                       "the object's place, which tell how bright each lamp is");
+    command.add_option("--flats-from", a->flats_from,
+                       "Take the flat frames of this sealed session along; calibration reads the lamps' intensities "
+                       "off them");
     command.add_option(
         "--exposure", a->exposure,
         "auto: metered, so that the object reaches 80 to 90 % of full scale; or microseconds; default: the "

@@ -5,12 +5,15 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "acquisition/device/clock.h"
 #include "acquisition/device/device_error.h"
+#include "rig/capture/light_by_hand.h"
 #include "rig/cli/rig_commands.h"
 #include "rig/daemon/client.h"
 #include "rig/daemon/hardware.h"
+#include "rig/daemon/session_folder.h"
 #include "rig/lamps/usb_bus.h"
 
 namespace darkbox {
@@ -23,6 +26,7 @@ struct LampsArguments {
     fs::path socket;
     std::string lamp;
     std::optional<double> seconds;
+    std::string object;
     bool boards = false;
 };
 
@@ -103,41 +107,44 @@ CommandResult dark(const LampsArguments& a, const WorkContext&) {
     return all_dark("all lamps are dark");
 }
 
-LampId find_lamp(const RigDescription& rig, const std::string& name) {
-    const auto found = std::find_if(rig.lamps.begin(), rig.lamps.end(),
-                                    [&](const LampDescription& lamp) { return lamp.name == name; });
-    if (found == rig.lamps.end())
-        throw InputError(fmt::format("there is no lamp '{}'", name), "darkbox lamps list names them");
-    return LampId{static_cast<std::uint32_t>(found - rig.lamps.begin())};
-}
-
-/// Ends early when asked to stop.
-void wait(Seconds time, const WorkContext& work) {
-    constexpr auto step = std::chrono::milliseconds(20);
-    SystemClock clock;
-    const TimePoint end = clock.now() + to_nanoseconds(time);
-    while (!work.cancelled() && clock.now() < end) clock.sleep_until(std::min(end, clock.now() + step));
+/// Follows the lamp until it is dark again; Ctrl-C darkens it.
+CommandResult light_through(const DaemonClient& client, const LampsArguments& a, const WorkContext& work) {
+    DaemonClient::Json order{{"lamp", a.lamp}};
+    if (a.seconds) order["seconds"] = *a.seconds;
+    if (!a.object.empty()) order["object"] = a.object;
+    const DaemonClient::Json accepted = client.call("POST", "lamps/on", order);
+    DaemonClient::Json told;
+    bool asked = false;
+    client.follow_events(accepted.at("event"), {.event =
+                                                    [&](const DaemonClient::Json& event) {
+                                                        if (event.at("event") != "light")
+                                                            return DaemonClient::Follow::go_on;
+                                                        told = event;
+                                                        return DaemonClient::Follow::leave;
+                                                    },
+                                                .idle =
+                                                    [&] {
+                                                        if (!work.cancelled() || std::exchange(asked, true)) return;
+                                                        client.call("POST", "lamps/dark");
+                                                    }});
+    if (told.is_null())
+        throw DeviceError("darkboxd stopped before it told whether the lamps are dark", "look at the lamps");
+    if (!told.at("lit")) throw DeviceError(told.at("detail"), told.at("hint"));
+    return all_dark(fmt::format("'{}' was lit; all lamps are dark", a.lamp));
 }
 
 CommandResult on(const LampsArguments& a, const WorkContext& work) {
-    if (running_daemon(a))
-        throw InputError("darkboxd runs, and the lamps are its own", "stop it to light a lamp by hand");
+    const auto daemon = running_daemon(a);
+    if (daemon && a.rig.empty()) return light_through(*daemon, a, work);
+    if (daemon) throw InputError("darkboxd runs, and has its rig already", "leave out --rig");
     const RigDescription rig = rig_of(a);
-    const LampId lamp = find_lamp(rig, a.lamp);
-    // The guardian takes a lamp that reaches max_on for forgotten.
-    constexpr double share_of_max_on = 0.9;
-    const Seconds most = rig.lamps[lamp.value].max_on * share_of_max_on;
-    const Seconds time = a.seconds ? Seconds(*a.seconds) : most;
-    if (time > most)
-        throw InputError(fmt::format("--seconds is {}; allowed: above 0 to {:.3g}, nine tenths of max_on_s of '{}'",
-                                     time.count(), most.count(), a.lamp),
-                         "light it for a shorter time");
+    const HandLight light =
+        light_by_hand(rig, a.lamp, a.seconds ? std::optional(Seconds(*a.seconds)) : std::nullopt, a.object);
     Hardware hardware(rig);
     const auto lamps = hardware.open_lamps();
-    const DarkOnExit dark_on_exit(*lamps);
-    lamps->light(lamp, 1.0);
-    wait(time, work);
-    lamps->dark();
+    SystemClock clock;
+    shine(light, rig, *lamps, clock, rig.sessions_folder.empty() ? default_sessions_folder() : rig.sessions_folder,
+          work);
     return all_dark(fmt::format("'{}' was lit; all lamps are dark", a.lamp));
 }
 
@@ -159,8 +166,10 @@ void add_lamps_commands(CommandLine& line) {
     add_lamps_flash_command(line, group);
     add("dark", "Darken every lamp; a running capture is cancelled", "darkbox lamps dark", dark);
     const auto [command, a] =
-        add("on", "Light one lamp for a moment, without darkboxd", "darkbox lamps on low-1 --rig rig.toml", on);
+        add("on", "Light one lamp for a moment", "darkbox lamps on low-1 --seconds 2 --object vase", on);
     command->add_option("name", a->lamp, "The lamp")->required();
+    command->add_option("--object", a->object,
+                        "What lies in its light, which counts as light it has had; else it is booked on the rig");
     command->add_option("--seconds", a->seconds, "How long; default and most: nine tenths of the lamp's max_on_s")
         ->check(CLI::PositiveNumber);
 }

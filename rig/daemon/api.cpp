@@ -139,6 +139,7 @@ const std::vector<Api::Route>& Api::table() {
         {"GET", "lamps", {}, &Api::lamps},
         {"GET", "dose", {}, &Api::dose},
         {"POST", "lamps/dark", {}, &Api::darken},
+        {"POST", "lamps/on", {}, &Api::light},
         {"GET", "events", {"after"}, &Api::events},
         {"GET", "preview", {}, &Api::preview},
         {"POST", "captures", {}, &Api::start_capture},

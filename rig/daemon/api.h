@@ -76,6 +76,7 @@ private:
     ApiResponse lamps(const Call& call) const;
     ApiResponse dose(const Call& call) const;
     ApiResponse darken(const Call& call) const;
+    ApiResponse light(const Call& call) const;
     ApiResponse events(const Call& call) const;
     ApiResponse start_capture(const Call& call) const;
     ApiResponse jobs(const Call& call) const;

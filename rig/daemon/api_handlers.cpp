@@ -86,6 +86,10 @@ ApiResponse Api::lamps(const Call&) const {
 
 ApiResponse Api::darken(const Call&) const { return reply({{"event", service_.darken()}}, 202); }
 
+ApiResponse Api::light(const Call& call) const {
+    return reply({{"event", service_.light(hand_light_from(need_json(call.request), rig_))}}, 202);
+}
+
 ApiResponse Api::events(const Call& call) const {
     ApiResponse response;
     response.content_type = "application/x-ndjson";

@@ -37,6 +37,13 @@ ExposureChoice exposure(const Json& value) {
                      R"(write "auto", or microseconds: 1 to 60000000)");
 }
 
+FrameKind plan(const Json& value) {
+    const std::string plan = text(value, "plan");
+    if (plan == "lit") return FrameKind::lit;
+    if (plan == "flat") return FrameKind::flat;
+    throw InputError(fmt::format("unknown plan \"{}\"", plan), "known: lit, flat");
+}
+
 std::vector<std::string> texts(const Json& value, const std::string& key) {
     if (!value.is_array() || value.size() > most_lamps)
         throw InputError(fmt::format("\"{}\" is not a list of up to {} names", key, most_lamps),
@@ -81,6 +88,10 @@ CaptureOrder capture_order_from(const Json& json) {
             order.resume = text(value, key);
         } else if (key == "retake") {
             order.retake = text(value, key);
+        } else if (key == "plan") {
+            order.kind = plan(value);
+        } else if (key == "flats_from") {
+            order.flats_from = text(value, key);
         } else if (key == "exposure") {
             order.exposure = exposure(value);
         } else if (key == "lamps") {
@@ -95,11 +106,32 @@ CaptureOrder capture_order_from(const Json& json) {
                 throw InputError(fmt::format("unknown mode \"{}\"", text(value, key)),
                                  "known: settled, predictive, strobed");
         } else if (key != "process") {  // what is to follow is the queue's concern
-            throw InputError(fmt::format("unknown key \"{}\"", key.substr(0, longest_text)),
-                             "known: object, inventory, dublin_core, lamps, mode, exposure, name, retake, resume");
+            throw InputError(
+                fmt::format("unknown key \"{}\"", key.substr(0, longest_text)),
+                "known: object, inventory, dublin_core, lamps, mode, exposure, plan, flats_from, name, retake, "
+                "resume");
         }
     }
     return order;
+}
+
+HandLight hand_light_from(const Json& body, const RigDescription& rig) {
+    std::string lamp, object;
+    std::optional<Seconds> time;
+    for (const auto& [key, value] : body.items()) {
+        if (key == "lamp") {
+            lamp = text(value, key);
+        } else if (key == "object") {
+            object = text(value, key);
+        } else if (key == "seconds") {
+            if (!value.is_number()) throw InputError("\"seconds\" is not a number", "write 1.5");
+            time = Seconds(value.get<double>());
+        } else {
+            throw InputError(fmt::format("unknown key \"{}\"", key.substr(0, longest_text)),
+                             "known: lamp, seconds, object");
+        }
+    }
+    return light_by_hand(rig, lamp, time, object);
 }
 
 Job job_from(const Json& body) {
@@ -161,6 +193,8 @@ Json to_json(const CaptureOrder& order) {
         const auto& fixed = order.exposure->fixed;
         json["exposure"] = fixed ? Json(fixed->count() * 1e6) : Json("auto");
     }
+    if (order.kind != FrameKind::lit) json["plan"] = name(order.kind);
+    if (order.flats_from) json["flats_from"] = *order.flats_from;
     if (order.retake) json["retake"] = *order.retake;
     if (order.resume) json["resume"] = *order.resume;
     return json;

@@ -29,7 +29,7 @@ public:
         also_ = std::move(also);
     }
 
-    /// Types: "state", "progress", "done", "cancelled", "failed", "lamps".
+    /// Types: "state", "progress", "done", "cancelled", "failed", "lamps", "light", "problem".
     void publish(const std::string& type, nlohmann::json fields);
     std::vector<Event> after(std::uint64_t number) const;
     std::uint64_t last() const;

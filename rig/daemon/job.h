@@ -18,6 +18,8 @@ struct CaptureOrder {
     std::vector<std::string> lamps = {};          ///< names; empty = all
     std::optional<SyncMode> mode = {};            ///< none: the one of rig.toml
     std::optional<ExposureChoice> exposure = {};  ///< none: as rig.toml says
+    FrameKind kind = FrameKind::lit;              ///< or flat: of a card in the object's place
+    std::optional<std::string> flats_from = {};   ///< name of a sealed session of kind flat that tells intensities
     std::optional<std::string> retake = {};       ///< name of a sealed session whose `lamps` are to be taken again
     std::string name = {};                        ///< of the session; empty = made from object and date
     std::optional<std::string> resume = {};       ///< name of an interrupted session

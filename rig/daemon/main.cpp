@@ -65,7 +65,9 @@ std::uint64_t capture_bytes(const RigDescription& rig, const CaptureOrder& order
     const auto width = static_cast<std::uint64_t>(simulated ? rig.sim.width : rig.camera.width);
     const auto height = static_cast<std::uint64_t>(simulated ? rig.sim.height : rig.camera.height);
     const std::uint64_t pixels = width * height > 0 ? width * height : large;
-    const std::uint64_t planes = rig.camera.format.starts_with("RGB") || rig.camera.format.starts_with("BGR") ? 3 : 1;
+    const std::string& format = rig.camera.format;
+    const bool colour = format == "MJPG" || format.starts_with("RGB") || format.starts_with("BGR");
+    const std::uint64_t planes = colour ? 3 : 1;
     const std::size_t lamps = order.lamps.empty() ? rig.lamps.size() : order.lamps.size();
     const auto brackets = static_cast<std::uint64_t>(rig.capture.brackets.size());
     const auto lit = lamps * static_cast<std::uint64_t>(rig.capture.averages);
@@ -122,6 +124,9 @@ public:
         options.bytes_needed = [this](const CaptureOrder& order) { return capture_bytes(rig_, order); };
         options.run_processing = processing_by(darkbox_beside_this_program());
         options.retention = rig_.retention;
+        options.shine = [this, sessions](const HandLight& light, const CaptureDevices& d, const WorkContext& work) {
+            shine(light, rig_, d.lamps, d.clock, sessions, work);
+        };
         options.log = log;
         log_.tee([log](const std::string& event, const nlohmann::json& fields) { log(log_line_of(event, fields)); });
         service_.emplace([this] { return hardware_.open(); }, options, log_);

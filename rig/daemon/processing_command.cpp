@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
-using Clock = std::chrono::steady_clock;
+using JobClock = std::chrono::steady_clock;
 
 constexpr auto patience = std::chrono::seconds(10);  ///< between asking it to end and killing it
 constexpr int poll_ms = 100;
@@ -134,7 +134,7 @@ void take_lines(std::string& text, const std::function<void(const std::string&)>
 std::string follow(Command& command, const WorkContext& work, const std::function<void(const std::string&)>& note) {
     std::string out;
     std::string err;
-    std::optional<Clock::time_point> asked;
+    std::optional<JobClock::time_point> asked;
     std::array<pollfd, 2> ends{pollfd{command.out(), POLLIN, 0}, pollfd{command.err(), POLLIN, 0}};
     while (ends[0].fd >= 0 || ends[1].fd >= 0) {
         ::poll(ends.data(), ends.size(), poll_ms);
@@ -143,9 +143,9 @@ std::string follow(Command& command, const WorkContext& work, const std::functio
         take_lines(err, [&](const std::string& line) { tell_line(line, work, note); });
         if (!work.cancelled()) continue;
         if (!asked) {
-            asked = Clock::now();
+            asked = JobClock::now();
             command.signal(SIGTERM);
-        } else if (Clock::now() - *asked > patience) {
+        } else if (JobClock::now() - *asked > patience) {
             command.signal(SIGKILL);
         }
     }

@@ -6,6 +6,7 @@
 
 #include "acquisition/frame/error.h"
 #include "acquisition/session/bag.h"
+#include "rig/capture/flat_frames.h"
 #include "rig/daemon/attempt.h"
 #include "rig/daemon/capture_order_json.h"
 #include "rig/daemon/session_folder.h"
@@ -100,17 +101,19 @@ ServiceStatus Service::status() const {
 
 CaptureRequest Service::request_for(const CaptureOrder& order, int attempt) const {
     const bool resumes = order.resume.has_value();
-    if (resumes &&
-        !(order.name.empty() && order.object.empty() && order.record.empty() && !order.retake && !order.exposure))
+    const bool lit = order.kind == FrameKind::lit;
+    if (resumes && !(order.name.empty() && order.object.empty() && order.record.empty() && !order.retake &&
+                     !order.exposure && !order.flats_from && lit))
         throw InputError("a resumed session keeps its name, object and plan", "give either \"resume\" or the others");
     if (order.retake && order.exposure)
         throw InputError("a re-take keeps its session's exposure", "leave out \"exposure\"");
-    const std::string session =
-        resumes ? *order.resume
-        : order.name.empty()
-            ? fresh_session_name(options_.sessions, order.object.empty() ? order.retake.value_or("") : order.object,
-                                 std::chrono::system_clock::now())
-            : order.name;
+    if (order.retake && (order.flats_from || !lit))
+        throw InputError("a re-take keeps its session's flat frames", "leave out \"plan\" and \"flats_from\"");
+    const std::string label = !order.object.empty() ? order.object : lit ? order.retake.value_or("") : flat_object;
+    const std::string session = resumes ? *order.resume
+                                : order.name.empty()
+                                    ? fresh_session_name(options_.sessions, label, std::chrono::system_clock::now())
+                                    : order.name;
     CaptureRequest request{.folder = session_path(options_.sessions, session),
                            .object = order.object,
                            .lamps = order.lamps,
@@ -118,12 +121,16 @@ CaptureRequest Service::request_for(const CaptureOrder& order, int attempt) cons
                            .mode = order.mode};
     request.record = order.record;
     request.exposure = order.exposure;
-    if (order.retake) {
-        request.retake = session_path(options_.sessions, *order.retake);
-        if (!is_sealed(*request.retake))
-            throw NotFound(fmt::format("there is no sealed session \"{}\"", *order.retake),
-                           "darkbox sessions lists them");
-    }
+    request.kind = order.kind;
+    const auto sealed = [&](const std::optional<std::string>& name) -> std::optional<std::filesystem::path> {
+        if (!name) return std::nullopt;
+        auto folder = session_path(options_.sessions, *name);
+        if (!is_sealed(folder))
+            throw NotFound(fmt::format("there is no sealed session \"{}\"", *name), "darkbox sessions lists them");
+        return folder;
+    };
+    request.retake = sealed(order.retake);
+    request.flats = sealed(order.flats_from);
     const bool there = std::filesystem::exists(request.folder);
     if (resumes && !there)
         throw NotFound(fmt::format("there is no session \"{}\"", session), "darkbox sessions lists them");
@@ -192,8 +199,22 @@ std::uint64_t Service::darken() {
     const std::scoped_lock lock(mutex_);
     if (state_ == ServiceState::offline) refuse(state_, problem_);
     const std::uint64_t event = log_.last();
-    if (state_ == ServiceState::busy) book_.cancel(running_);
+    if (running_ != 0) book_.cancel(running_);
+    if (hand_light_) hand_light_->request_stop();
     tasks_.emplace_back(Darken{});  // also after a capture: its own darkening may have been told before `event`
+    wake_.notify_all();
+    return event;
+}
+
+std::uint64_t Service::light(const HandLight& light) {
+    const std::scoped_lock lock(mutex_);
+    if (stopping_) throw Refused("darkboxd is shutting down", "start it again");
+    if (state_ != ServiceState::idle) refuse(state_, problem_);
+    if (!options_.shine) throw Refused("this darkboxd lights no lamps by hand", "capture instead");
+    const std::uint64_t event = log_.last();
+    hand_light_.emplace();
+    tasks_.emplace_back(light);
+    enter(ServiceState::busy, "");
     wake_.notify_all();
     return event;
 }
@@ -202,6 +223,7 @@ void Service::request_stop() noexcept {
     {
         const std::scoped_lock lock(mutex_);
         stopping_ = true;
+        if (hand_light_) hand_light_->request_stop();
     }
     book_.cancel_running(Lane::rig);
     processing_.request_stop();
@@ -319,8 +341,26 @@ void Service::perform(const Job& begun) {
 void Service::perform(Darken) {
     const auto not_dark = darken_lamps();
     const std::scoped_lock lock(mutex_);
-    if (running_ != 0) return;  // a capture was accepted meanwhile and decides
+    if (running_ != 0 || hand_light_) return;  // a capture was accepted meanwhile, or a lamp to be lit, and decides
     enter(not_dark ? ServiceState::fault : ServiceState::idle, not_dark ? not_dark->what : "");
+}
+
+void Service::perform(const HandLight& light) {
+    WorkContext work;
+    {
+        const std::scoped_lock lock(mutex_);
+        work.stop = hand_light_->get_token();
+    }
+    const auto failure =
+        attempt([&] { rig_->lend([&](const CaptureDevices& devices) { options_.shine(light, devices, work); }); });
+    const auto not_dark = darken_lamps();
+    look_at_lamps();
+    const std::scoped_lock lock(mutex_);
+    hand_light_.reset();
+    enter(not_dark ? ServiceState::fault : ServiceState::idle, not_dark ? not_dark->what : "");
+    log_.publish("light", {{"lit", !failure},
+                           {"detail", failure ? failure->what : "the lamp was lit; all lamps are dark"},
+                           {"hint", failure ? failure->hint : ""}});
 }
 
 std::optional<Failure> Service::darken_lamps() {

@@ -17,6 +17,7 @@
 #include <variant>
 
 #include "acquisition/frame/error.h"
+#include "rig/capture/light_by_hand.h"
 #include "rig/daemon/capture_rig.h"
 #include "rig/daemon/events.h"
 #include "rig/daemon/folder_lock.h"
@@ -35,7 +36,7 @@ namespace darkbox {
 enum class ServiceState {
     offline,  ///< the rig's devices are not open yet; opening is tried again and again
     idle,
-    busy,   ///< a capture runs; processing does not count
+    busy,   ///< a capture runs, or a lamp is lit by hand; processing does not count
     fault,  ///< the lamps could not be proven dark; left by a successful lamps/dark
 };
 std::string_view name(ServiceState state);
@@ -57,7 +58,9 @@ struct ServiceOptions {
     std::uint64_t bytes_kept_free = 256ULL << 20;  ///< on the sessions' disk, beyond what a capture needs
     RunProcessing run_processing = {};             ///< empty: there is none, and such jobs are refused
     std::optional<RetentionRules> retention = {};  ///< none: prune jobs are refused
-    LogSink log = [](const LogLine&) {};           ///< hears of frames and of what captures note
+    /// Lights a lamp by hand and books its light; empty: refused.
+    std::function<void(const HandLight&, const CaptureDevices&, const WorkContext&)> shine = {};
+    LogSink log = [](const LogLine&) {};  ///< hears of frames and of what captures note
 };
 
 struct ServiceStatus {
@@ -103,6 +106,9 @@ public:
     /// Darkens the lamps; a running capture is cancelled for it. The event "lamps" tells how it went.
     /// Returns the number after which that event comes. Throws Refused when Offline.
     std::uint64_t darken();
+    /// Lights one lamp for its time, or until the lamps are darkened. The event "light" tells how it went.
+    /// Returns the number after which that event comes. Throws Refused unless Idle.
+    std::uint64_t light(const HandLight& light);
     /// Since the daemon started.
     JobCounts job_counts() const { return book_.counts(); }
     std::uint64_t frames_captured() const { return frames_captured_; }
@@ -117,7 +123,7 @@ public:
 
 private:
     struct Darken {};
-    using Task = std::variant<Job, Darken>;
+    using Task = std::variant<Job, Darken, HandLight>;
 
     CaptureRequest request_for(const CaptureOrder& order, int attempt) const;
 
@@ -130,6 +136,7 @@ private:
     void capture(Job& job, const WorkContext& work);
     CaptureListener listener_for(const Job& job);
     void perform(Darken);
+    void perform(const HandLight& light);
     std::optional<Failure> darken_lamps();
     void look_at_lamps();
     void finish(Job job, const std::optional<Failure>& not_dark);
@@ -148,6 +155,7 @@ private:
     std::string problem_;                         // guarded by mutex_
     std::deque<Task> tasks_;                      // guarded by mutex_
     std::uint64_t running_ = 0;                   // guarded by mutex_; 0 = none
+    std::optional<std::stop_source> hand_light_;  // guarded by mutex_; a lamp is lit by hand, or about to be
     bool stopping_ = false;                       // guarded by mutex_
     LampHealth lamps_;                            // guarded by mutex_
 

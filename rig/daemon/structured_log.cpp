@@ -144,6 +144,9 @@ LogLine log_line_of(const std::string& event, const Json& fields) {
         return {dark ? LogLevel::debug : LogLevel::error,
                 dark ? "all lamps are dark" : "the lamps could not be proven dark", picked(fields, {"detail"})};
     }
+    if (event == "light")
+        return {fields.value("lit", false) ? LogLevel::info : LogLevel::error,
+                "a lamp by hand: " + text(fields, "detail"), picked(fields, {"hint"})};
     if (event == "problem") return {LogLevel::error, text(fields, "detail"), picked(fields, {"job", "hint"})};
     if (event == "progress")
         return {LogLevel::debug, "progress", picked(fields, {"job", "stage", "done", "total", "detail"})};

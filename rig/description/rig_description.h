@@ -26,8 +26,8 @@ struct DoseDescription {
     std::optional<double> object_lux_s;  ///< over all of an object's captures
     std::optional<double> object_uv_j_per_m2;
     std::optional<double> object_ir_j_per_m2;
-    std::optional<double> capture_lux_s;               ///< in one capture
-    std::vector<std::string> exempt{"recalibration"};  ///< objects that bear any light, such as the mirror ball
+    std::optional<double> capture_lux_s;                       ///< in one capture
+    std::vector<std::string> exempt{"recalibration", "flat"};  ///< objects that bear any light: the mirror ball, a card
 };
 
 /// One lamp of the rig as rig.toml describes it. Its LampId is its place in RigDescription::lamps.

@@ -36,7 +36,7 @@ TEST(Scenes, UnknownNamesListTheKnownOnes) {
 }
 
 TEST(Scenes, BallStaysInViewApartFromTheObject) {
-    for (const std::string shape : {"sphere", "torus", "teapot", "relief"})
+    for (const std::string shape : {"sphere", "torus", "teapot", "relief", "card"})
         for (const int width : {64, 320}) {
             const Scene scene = scene_of(shape + "-lambert", width, lamps_at({{0, 0, 1}}));
             const SceneTruth truth = render_truth(scene);

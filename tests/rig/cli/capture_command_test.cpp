@@ -78,6 +78,52 @@ TEST_F(CaptureCommand, NamesLampsThatAreExchanged) {
     EXPECT_THAT(darkbox_program({"verify", again_}).err, testing::Not(HasSubstr("not verified")));
 }
 
+TEST_F(CaptureCommand, TakesTheFlatFramesOfACardAlong) {
+    const auto with = [&](const std::string& sim) {
+        std::string toml = test::small_rig(6);
+        toml.replace(toml.find("[sim]\nscene = \"brick-torus\""), 27,
+                     "[sim]\nfaults = \"dim-lamp@0:2=0.7\"\nscene = " + sim);
+        std::ofstream(rig_) << toml;
+    };
+    const fs::path card = folder_.path() / "card";
+    with("\"card\"");
+    const auto flat = capture({"--rig", rig_, "--plan", "flat", "--out", card});
+    ASSERT_EQ(flat.status, 0) << flat.err;
+    EXPECT_EQ(Session::open(card).frames()[1].kind, FrameKind::flat);
+    with("\"brick-torus\"");
+    const auto captured = capture({"--rig", rig_, "--flats-from", card, "--out", vase_});
+    ASSERT_EQ(captured.status, 0) << captured.err;
+    EXPECT_EQ(nlohmann::json::parse(captured.out).at("frames"), 16);
+    const auto calibrated = darkbox_program({"calibrate", vase_, "--json"});
+    ASSERT_EQ(calibrated.status, 0) << calibrated.err;
+    const auto lights = nlohmann::json::parse(calibrated.out).at("lights");
+    const double dim = lights.at(2).at("intensity").at(1), other = lights.at(0).at("intensity").at(1);
+    EXPECT_NEAR(dim / other, 0.7, 0.02);
+    const auto again = capture({"--rig", rig_, "--retake", vase_, "--lamps", "lamp-01", "--out", again_});
+    EXPECT_EQ(again.status, 0) << again.err;
+    EXPECT_THAT(capture({"--rig", rig_, "--plan", "flat", "--flats-from", card}).err, HasSubstr("at once"));
+    EXPECT_THAT(darkbox_program({"process", card}).err, HasSubstr("--flats-from"));
+}
+
+TEST_F(CaptureCommand, FailsByNameOnADiskThatDoesAndGoesOn) {
+    for (const std::string fault : {"failed-write", "full-disk"}) {
+        std::string toml = test::small_rig(6);
+        toml.replace(toml.find("[sim]\n"), 6, "[sim]\nfaults = \"" + fault + "@9\"\n");
+        std::ofstream(rig_) << toml;
+        const fs::path session = folder_.path() / fault;
+        const auto failed = capture({"--rig", rig_, "--out", session});
+        EXPECT_EQ(failed.status, 1);
+        EXPECT_THAT(failed.err, HasSubstr("write " + session.string()));
+        EXPECT_THAT(failed.err, HasSubstr("--resume " + session.string()));
+        // The write that comes next time is another frame's: each try gets further, as on a disk that fails at times.
+        int tries = 0;
+        while (capture({"--resume", session}).status != 0 && ++tries < 4) continue;
+        EXPECT_LT(tries, 4);
+        const auto verified = darkbox_program({"verify", session});
+        EXPECT_EQ(verified.status, 0) << verified.err;
+    }
+}
+
 TEST_F(CaptureCommand, RefusesWhatMakesNoSense) {
     EXPECT_THAT(capture({"--rig", rig_, "--exposure", "bright"}).err, HasSubstr("neither auto nor microseconds"));
     EXPECT_THAT(capture({"--rig", rig_, "--retake", vase_, "--exposure", "auto"}).err,

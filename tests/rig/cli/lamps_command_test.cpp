@@ -58,7 +58,7 @@ TEST_F(LampsCommand, LightsOnlyALampThatIsThereForATimeThatItBears) {
     EXPECT_THAT(unknown.err, HasSubstr("there is no lamp 'other'"));
     const auto too_long = lamps({"on", "only", "--seconds", "2", "--rig", rig_});
     EXPECT_EQ(too_long.status, 1);
-    EXPECT_THAT(too_long.err, HasSubstr("--seconds is 2; allowed: above 0 to 1.8"));
+    EXPECT_THAT(too_long.err, HasSubstr("is to be lit for 2 s; allowed: above 0 to 1.8"));
 }
 
 }  // namespace

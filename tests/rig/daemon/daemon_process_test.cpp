@@ -95,6 +95,34 @@ TEST_F(DaemonProcess, NamesLampsThatAreExchanged) {
     EXPECT_EQ(Session::open(sessions_ / "cat").events().back().what, findings[0]);
 }
 
+TEST_F(DaemonProcess, LightsALampByHandAndBooksItsLight) {
+    std::string toml = small_rig(6);
+    const std::string place = "position_mm";
+    for (auto at = toml.find(place); at != toml.npos; at = toml.find(place, at + 40))
+        toml.insert(at, "illuminance_lux = 1000\n");
+    std::ofstream(rig_) << toml << "\n[dose]\nobject_lux_s = 2000\n";
+    start();
+    const auto dose_of = [&](const std::string& whose) {
+        const json dose = client_.call("GET", "dose");
+        for (const json& object : dose.at("objects"))
+            if (object.at("object") == whose) return object.at("lux_s").get<double>();
+        return 0.0;
+    };
+    const Ended lit = darkbox({"lamps", "on", "lamp-03", "--seconds", "1.5", "--object", "vase", "--json"});
+    ASSERT_EQ(lit.status, 0) << lit.err;
+    EXPECT_EQ(json::parse(lit.out).at("dark"), true);
+    EXPECT_NEAR(dose_of("vase"), 1500, 5);
+    const Ended refused = darkbox({"lamps", "on", "lamp-03", "--seconds", "1.5", "--object", "vase"});
+    EXPECT_EQ(refused.status, 1);
+    EXPECT_THAT(refused.err, HasSubstr("'vase' has had 1500 of 2000 lux seconds"));
+    EXPECT_NEAR(dose_of("vase"), 1500, 5);
+    ASSERT_EQ(darkbox({"lamps", "on", "lamp-03", "--seconds", "1.6"}).status, 0);
+    ASSERT_EQ(darkbox({"lamps", "on", "lamp-04", "--seconds", "1.6"}).status, 0) << "the rig has no budget";
+    EXPECT_NEAR(dose_of("rig simulated-6"), 3200, 5);
+    EXPECT_THAT(darkbox({"lamps", "on", "lamp-09"}).err, HasSubstr("there is no lamp 'lamp-09'"));
+    EXPECT_TRUE(is_idle());
+}
+
 TEST_F(DaemonProcess, SigtermDuringACaptureLeavesItResumable) {
     start();
     client_.call("POST", "captures", {{"name", "vase"}});

@@ -132,6 +132,11 @@ def work_the_queue(api):
 
 def tell_doses(api, sessions):
     assert api.call("listDoses").json() == {"limits": {}, "objects": []}
+    light = api.call("lightLamp", {"lamp": "lamp-01", "seconds": 0.5, "object": "vase"}).json()
+    told = next(e for e in api.follow(light["event"]) if e["event"] == "light")
+    assert told["lit"] is True, told
+    assert api.call("lightLamp", {"lamp": "lamp-99"}).status == 400
+    assert api.call("listDoses").json()["objects"] == [], "these lamps do not say how bright they are"
     line = '{"object":"vase","lux_s":12.5,"uv_j_per_m2":0,"ir_j_per_m2":0.25}\n'
     (sessions / ".darkbox" / "dose.jsonl").write_text(2 * line)
     assert api.call("listDoses").json()["objects"] == [

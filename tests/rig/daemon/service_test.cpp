@@ -22,6 +22,7 @@ protected:
         ServiceOptions options;
         options.sessions = folder_.path();
         options.reopen_every = std::chrono::milliseconds(5);
+        options.shine = [](const HandLight&, const CaptureDevices&, const WorkContext&) {};
         service_.emplace(open_fake(script_), options, log_);
         return *service_;
     }
@@ -105,6 +106,25 @@ TEST_F(ServiceTest, RefusesACaptureInEveryStateButIdle) {
 }
 
 TEST_F(ServiceTest, RefusesToDarkenWhatIsNotOpen) { EXPECT_THROW(start_offline().darken(), Refused); }
+
+TEST_F(ServiceTest, LightsALampByHandOnlyWhenIdleAndIsBusyMeanwhile) {
+    EXPECT_THROW(start_offline().light({LampId{0}, Seconds(1), ""}), Refused);
+    service_.reset();
+    script_.failing_opens = 0;
+    EXPECT_THROW(start_busy().light({LampId{0}, Seconds(1), ""}), Refused);
+    service_.reset();
+    EXPECT_THROW(start_fault().light({LampId{0}, Seconds(1), ""}), Refused);
+    service_.reset();
+    script_.dark_fails = false;
+    script_.body = [](const auto&, const auto&) {};
+    Service& service = start_idle();
+    const std::uint64_t before = service.light({LampId{0}, Seconds(1), ""});
+    EXPECT_TRUE(eventually([this] { return event_types(log_).back() == "light"; }));
+    EXPECT_EQ(service.status().state, ServiceState::idle);
+    EXPECT_GT(all_events(log_).back().at("number").get<std::uint64_t>(), before);
+    EXPECT_EQ(all_events(log_).back().at("lit"), true);
+    EXPECT_EQ(end_of(service, service.start_capture({.object = "vase"}).id), JobState::done);
+}
 
 TEST_F(ServiceTest, OpensTheRigOnceItIsThere) {
     script_.failing_opens = 3;
