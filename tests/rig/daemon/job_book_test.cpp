@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 
 #include <fstream>
+#include <latch>
+#include <thread>
 
 #include "acquisition/session/session_writer.h"
 #include "tests/rig/daemon/fake_rig.h"
@@ -141,10 +143,18 @@ TEST_F(JobBookTest, PutBackDoesNotCountAsAnAttempt) {
     const Job job = restart().add(process("a"));
     for (int i = 0; i < 5; ++i) {
         ASSERT_TRUE(book_->take(Lane::processing)) << i;
-        book_->put_back(job.id);
+        EXPECT_TRUE(book_->put_back(job.id));
         restart();
     }
     EXPECT_EQ(book_->take(Lane::processing)->attempts, 1);
+}
+
+TEST_F(JobBookTest, WhatSomebodyCancelledIsNotPutBack) {
+    const Job job = restart().add(process("a"));
+    ASSERT_TRUE(book_->take(Lane::processing));
+    book_->cancel(job.id);
+    EXPECT_FALSE(book_->put_back(job.id));
+    EXPECT_EQ(book_->find(job.id).state, JobState::running);
 }
 
 TEST_F(JobBookTest, CancelsWhatWaitsAtOnceAndAsksWhatRuns) {
@@ -157,6 +167,31 @@ TEST_F(JobBookTest, CancelsWhatWaitsAtOnceAndAsksWhatRuns) {
     EXPECT_TRUE(book.stop_token(running).stop_requested());
     EXPECT_FALSE(book.take(Lane::rig));
     EXPECT_EQ(event_types(log_).back(), "cancelled");
+}
+
+TEST_F(JobBookTest, WhatIsCancelledAsALaneTakesItIsCancelledOrAskedToStop) {
+    JobBook& book = restart();
+    for (int i = 0; i < 200; ++i) {
+        const auto id = book.add(process("a")).id;
+        std::optional<Job> taken;
+        std::latch together(2);
+        {
+            const std::jthread lane([&] {
+                together.arrive_and_wait();
+                taken = book.take(Lane::processing);
+            });
+            together.arrive_and_wait();
+            book.cancel(id);
+        }
+        if (!taken) {
+            EXPECT_EQ(book.find(id).state, JobState::cancelled) << i;
+            continue;
+        }
+        EXPECT_EQ(book.find(id).state, JobState::running) << i;
+        ASSERT_TRUE(book.stop_token(id).stop_requested()) << i;
+        taken->state = JobState::cancelled;
+        book.finish(std::move(*taken));
+    }
 }
 
 TEST_F(JobBookTest, KeepsTheLastJobsAndTheirLogsOnly) {
