@@ -50,7 +50,7 @@ TEST(Dose, IsReadOfLampsAndBudgets) {
 TEST(Dose, IsNotLimitedWhereNothingIsSaid) {
     const RigDescription rig = parse_rig(simulated(""), "rig.toml");
     EXPECT_FALSE(rig.dose.object_lux_s || rig.dose.capture_lux_s);
-    EXPECT_THAT(rig.dose.exempt, ElementsAre("recalibration"));
+    EXPECT_THAT(rig.dose.exempt, ElementsAre("recalibration", "flat"));
 }
 
 TEST(Dose, BudgetsNeedLampsThatSayWhatTheyGive) {
