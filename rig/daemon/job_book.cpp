@@ -142,17 +142,19 @@ Job JobBook::cancel(std::uint64_t id) {
         if (found == live_.end()) return job;  // it ended just now
         found->second.stop.request_stop();
         job = found->second.job;
+        if (job.state != JobState::queued) return job;
+        found->second.job.state = job.state = JobState::cancelled;  // no lane takes it any more
     }
-    if (job.state != JobState::queued) return job;
-    job.state = JobState::cancelled;
     job.failure = {.cancelled = true, .what = "it was cancelled before it began", .hint = "ask for it again"};
     return finish(std::move(job));
 }
 
 std::stop_token JobBook::stop_token(std::uint64_t id) const {
     const std::scoped_lock lock(mutex_);
-    const auto found = live_.find(id);
-    return found == live_.end() ? std::stop_token() : found->second.stop.get_token();
+    if (const auto found = live_.find(id); found != live_.end()) return found->second.stop.get_token();
+    std::stop_source ended;
+    ended.request_stop();
+    return ended.get_token();
 }
 
 void JobBook::cancel_running(Lane lane) {

@@ -56,6 +56,7 @@ public:
 
     /// A queued job is cancelled at once, a running one asked to stop; one that ended is left as it is.
     Job cancel(std::uint64_t id);
+    /// What ended has been asked to stop.
     std::stop_token stop_token(std::uint64_t id) const;
     void cancel_running(Lane lane);
 

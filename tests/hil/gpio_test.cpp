@@ -19,6 +19,7 @@
 namespace darkbox {
 namespace {
 
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -185,6 +186,22 @@ TEST_F(Gpio, DarkboxLampsDrivesThem) {
 
     const test::Printed dark = test::shell(darkbox + " lamps dark --rig " + rig);
     EXPECT_EQ(dark.status, 0) << dark.text;
+}
+
+TEST_F(Gpio, DoctorNamesWhoHoldsALine) {
+    const test::TemporaryFolder folder;
+    const std::string rig = (folder.path() / "rig.toml").string();
+    std::ofstream(rig) << test::rig_toml({.lamps = 16});  // the last on the line that the kernel gave to a fan
+    const std::string doctor = test::program("darkbox") + " doctor --rig " + rig;
+    EXPECT_THAT(test::shell(doctor).text, AllOf(HasSubstr("good  line 5 of lamps: free"),
+                                                HasSubstr("BAD   line 15 of lamps: held by \"the-fan\"\n"
+                                                          "      → stop that program (sudo fuser -v /dev/gpiochip")));
+
+    const test::ChildProcess holder({"/usr/bin/gpioset", "--mode=signal", "lamps", "5=1"}, folder.path() / "gpioset");
+    ASSERT_TRUE(test::comes_true([&] { return chip().is_high(5); }));
+    const test::Printed held = test::shell(doctor);
+    EXPECT_THAT(held.text, HasSubstr("BAD   line 5 of lamps: held by \"gpioset\""));
+    EXPECT_TRUE(chip().is_high(5)) << "it only looks";
 }
 
 }  // namespace

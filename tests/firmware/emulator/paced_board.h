@@ -54,6 +54,9 @@ public:
     std::function<bool(TimePoint)> strobe_line;
     /// Of CLOCK_MONOTONIC: where the chip's time has got to; on the board's thread.
     TimePoint board_time() const;
+    /// How far the chip's time ever was behind the wall clock's on a busy machine, which a real chip's never is; on the
+    /// board's thread.
+    std::chrono::nanoseconds worst_lateness() const { return worst_lateness_; }
     /// Called on the board's thread when it went away by a reset, and when it is back.
     std::function<void(bool present)> on_presence;
 
@@ -83,6 +86,7 @@ private:
     bool strobe_up_ = false;
     std::chrono::steady_clock::time_point wall_start_;
     std::uint64_t cycle_start_ = 0;
+    std::chrono::nanoseconds worst_lateness_{0};
     std::thread thread_;
 };
 

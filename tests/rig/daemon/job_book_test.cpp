@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 
 #include <fstream>
+#include <latch>
+#include <thread>
 
 #include "acquisition/session/session_writer.h"
 #include "tests/rig/daemon/fake_rig.h"
@@ -157,6 +159,31 @@ TEST_F(JobBookTest, CancelsWhatWaitsAtOnceAndAsksWhatRuns) {
     EXPECT_TRUE(book.stop_token(running).stop_requested());
     EXPECT_FALSE(book.take(Lane::rig));
     EXPECT_EQ(event_types(log_).back(), "cancelled");
+}
+
+TEST_F(JobBookTest, WhatIsCancelledAsALaneTakesItIsCancelledOrAskedToStop) {
+    JobBook& book = restart();
+    for (int i = 0; i < 200; ++i) {
+        const auto id = book.add(process("a")).id;
+        std::optional<Job> taken;
+        std::latch together(2);
+        {
+            const std::jthread lane([&] {
+                together.arrive_and_wait();
+                taken = book.take(Lane::processing);
+            });
+            together.arrive_and_wait();
+            book.cancel(id);
+        }
+        if (!taken) {
+            EXPECT_EQ(book.find(id).state, JobState::cancelled) << i;
+            continue;
+        }
+        EXPECT_EQ(book.find(id).state, JobState::running) << i;
+        ASSERT_TRUE(book.stop_token(id).stop_requested()) << i;
+        taken->state = JobState::cancelled;
+        book.finish(std::move(*taken));
+    }
 }
 
 TEST_F(JobBookTest, KeepsTheLastJobsAndTheirLogsOnly) {
