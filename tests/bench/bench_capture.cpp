@@ -5,6 +5,7 @@
 #include <chrono>
 #include <filesystem>
 #include <random>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -12,7 +13,9 @@
 #include "acquisition/session/durable_file.h"
 #include "acquisition/session/frame_file.h"
 #include "acquisition/session/sha256.h"
+#include "rig/capture/picture_check.h"
 #include "rig/capture/session_recorder.h"
+#include "sim/quick_sensor.h"
 
 namespace darkbox {
 namespace {
@@ -21,6 +24,7 @@ namespace fs = std::filesystem;
 using Stopwatch = std::chrono::steady_clock;
 
 constexpr int frames = 64;
+constexpr std::size_t samples = std::size_t{1920} * 1080;
 constexpr double camera_rate = 30;  ///< frames a second
 
 /// In $TMPDIR, or here: name the disk that is to be measured.
@@ -43,7 +47,7 @@ private:
 
 /// Samples that no file system could make smaller.
 std::vector<std::byte> noise() {
-    std::vector<std::byte> pixels(std::size_t{1920} * 1080 * 2);
+    std::vector<std::byte> pixels(2 * samples);
     std::mt19937 random(5);
     for (std::byte& b : pixels) b = static_cast<std::byte>(random());
     return pixels;
@@ -133,9 +137,59 @@ void checksum(benchmark::State& state) {
     for (auto _ : state) benchmark::DoNotOptimize(sha256_hex(pixels));
 }
 
+/// A frame under one lamp, and one that saw a switch.
+void expose_quickly(benchmark::State& state) {
+    const auto lights = static_cast<std::size_t>(state.range(0));
+    const std::vector<float> light(samples, 0.3F);
+    std::vector<std::uint16_t> exposed(samples);
+    sim::Sensor sensor;
+    sensor.bit_depth = 16;
+    const sim::QuickSensor quick(1);
+    const std::vector<sim::LightShare> shares(lights, {1.0F / static_cast<float>(lights), light});
+    std::uint64_t frame = 0;
+    for (auto _ : state) {
+        quick.expose(sensor, shares, {0.02, 1.0, ++frame}, exposed);
+        benchmark::ClobberMemory();
+    }
+}
+
+/// What predictive mode does with each picture, four lamps by turns.
+void look_at_picture(benchmark::State& state) {
+    sim::Sensor sensor;
+    sensor.bit_depth = 16;
+    sensor.black_level = 1024;
+    const sim::QuickSensor quick(1);
+    std::uint64_t number = 0;
+    const auto shot = [&](int lamp) {
+        std::vector<float> light(samples, 0.0F);
+        for (std::size_t i = 0; lamp > 0 && i < samples; ++i)
+            light[i] = 0.1F + 0.1F * static_cast<float>((i / 97) % static_cast<std::size_t>(lamp + 1));
+        std::vector<std::uint16_t> exposed(samples);
+        quick.expose(sensor, {{{1.0F, light}}}, {0.02, 1.0, ++number}, exposed);
+        const auto bytes = std::as_bytes(std::span(exposed));
+        return frame_of({bytes.begin(), bytes.end()});
+    };
+    CameraInfo camera;
+    camera.bit_depth = 16;
+    camera.black_level = 1024;
+    PictureCheck check(camera, {});
+    check.accept_dark(shot(0));
+    std::vector<Frame> frames_of_lamps;
+    for (int i = 0; i < frames; ++i) frames_of_lamps.push_back(shot(1 + i % 4));
+    const Frame confirming = shot(1);
+    check.accept_lit("lamp-1", shot(1), &confirming);
+    std::size_t next = 0;
+    for (auto _ : state) {
+        benchmark::DoNotOptimize(check.accept_lit("lamp-" + std::to_string(1 + next % 4), frames_of_lamps[next]));
+        ++next;
+    }
+}
+
 BENCHMARK(write_session)->UseManualTime()->Iterations(3)->Unit(benchmark::kMillisecond);
 BENCHMARK(encode)->Unit(benchmark::kMillisecond);
 BENCHMARK(checksum)->Unit(benchmark::kMillisecond);
+BENCHMARK(expose_quickly)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond);
+BENCHMARK(look_at_picture)->Iterations(frames)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace darkbox
