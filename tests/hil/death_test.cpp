@@ -245,8 +245,8 @@ TEST_F(DeathBesideTheGuardiansUnit, AfterSigtermOfTheGuardianWhichStaysAsLongAsI
     EXPECT_TRUE(chip->is_high(4));
     daemon_unit->kill();
     EXPECT_TRUE(is_dark());
-    expect_order();
     EXPECT_EQ(program->wait(), 0) << program->err();
+    expect_order();
 }
 
 TEST_F(Death, ByHangingDarkensAndTheGuardianGoesOnHolding) {
