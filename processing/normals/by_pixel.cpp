@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "processing/normals/pixel_sample.h"
@@ -15,11 +16,14 @@ namespace {
 /// One row's work: what is shared by its pixels.
 class RowByPixel {
 public:
-    RowByPixel(const LightField& field, PixelMethod method, const SampleModel& model, float min_albedo)
-        : field_(field), method_(method), model_(model), factor_(model.law), min_albedo_(min_albedo) {}
+    RowByPixel(const LightField& field, PixelMethod method, const SampleModel& model, float min_albedo,
+               SampleUseSink* sink)
+        : field_(field), method_(method), model_(model), factor_(model.law), min_albedo_(min_albedo), sink_(sink) {}
 
     std::size_t solve(const PhotoBand& band, int row, SolvedMaps& maps) {
         samples_.load(band, field_.set(), row);
+        const std::size_t lights = field_.set().lights.size();
+        if (sink_ != nullptr) uses_.assign(lights * static_cast<std::size_t>(samples_.cols()), SampleUse::no_normal);
         const int picture_row = band.first_row + row;
         std::size_t not_finite = 0;
         for (int x = 0; x < samples_.cols(); ++x) {
@@ -30,6 +34,8 @@ public:
             else
                 ++not_finite;
         }
+        if (sink_ != nullptr)
+            for (std::size_t k = 0; k < lights; ++k) sink_->take(picture_row, field_.set().lights[k].image, uses_of(k));
         return not_finite;
     }
 
@@ -57,6 +63,14 @@ private:
         maps.albedo(row, column) = albedo;
         maps.valid(row, column) = 255;
         write_confidence(*fit, row, column, maps);
+        if (sink_ != nullptr)
+            for (std::size_t k = 0; k < arrivals_.size(); ++k)
+                uses_of(k)[static_cast<std::size_t>(column)] = solver_.use(k);
+    }
+
+    std::span<SampleUse> uses_of(std::size_t k) {
+        const auto cols = static_cast<std::size_t>(samples_.cols());
+        return std::span(uses_).subspan(k * cols, cols);
     }
 
     /// None of the weights is above zero where no sample was kept: black then.
@@ -88,6 +102,8 @@ private:
     const SampleModel& model_;
     BodyFactor factor_;
     float min_albedo_;
+    SampleUseSink* sink_;
+    std::vector<SampleUse> uses_;  ///< of this row: one photograph after the other
     SampleRow samples_;
     PixelSolver solver_;
     std::vector<Arrival> arrivals_;
@@ -96,8 +112,9 @@ private:
 }  // namespace
 
 std::size_t solve_row_by_pixel(const PhotoBand& band, const LightField& field, PixelMethod method,
-                               const SampleModel& model, float min_albedo, int row, SolvedMaps& maps) {
-    return RowByPixel(field, method, model, min_albedo).solve(band, row, maps);
+                               const SampleModel& model, float min_albedo, int row, SolvedMaps& maps,
+                               SampleUseSink* uses) {
+    return RowByPixel(field, method, model, min_albedo, uses).solve(band, row, maps);
 }
 
 }  // namespace darkbox

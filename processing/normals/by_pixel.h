@@ -8,6 +8,7 @@
 #include "processing/normals/least_squares.h"
 #include "processing/normals/light_field.h"
 #include "processing/normals/noise_model.h"
+#include "processing/normals/sample_use.h"
 
 namespace darkbox {
 
@@ -26,8 +27,9 @@ enum class PixelMethod {
 /// Solves one row of a band pixel by pixel, each with its own lights: for near lights, and for the robust solver.
 /// Writes the row band.first_row + row of the maps. Albedo per channel is the least-squares factor of (N.L) f over the
 /// samples kept, weighted as they were. Returns how many pixels on the object were left out for a sample that is not a
-/// finite number.
+/// finite number. `uses`, where given, is told the row of every used photograph.
 std::size_t solve_row_by_pixel(const PhotoBand& band, const LightField& field, PixelMethod method,
-                               const SampleModel& model, float min_albedo, int row, SolvedMaps& maps);
+                               const SampleModel& model, float min_albedo, int row, SolvedMaps& maps,
+                               SampleUseSink* uses = nullptr);
 
 }  // namespace darkbox

@@ -50,7 +50,8 @@ public:
 private:
     std::size_t solve_row(const PhotoBand& band, int row) {
         if (options_.solver == Solver::robust)
-            return solve_row_by_pixel(band, field_, PixelMethod::robust, model_, options_.min_albedo, row, maps_);
+            return solve_row_by_pixel(band, field_, PixelMethod::robust, model_, options_.min_albedo, row, maps_,
+                                      options_.uses);
         if (!field_.uniform())
             return solve_row_by_pixel(band, field_, PixelMethod::least_squares, model_, options_.min_albedo, row,
                                       maps_);
@@ -172,6 +173,9 @@ void PhotometricStereoOptions::validate() const {
         throw InputError(fmt::format("min_albedo is {}", min_albedo), "allowed: 0 or more (1.0 = full scale)");
     if (model.noise) model.noise->validate();
     if (memory_mib < 1) throw InputError(fmt::format("memory_mib is {}", memory_mib), "allowed: 1 or more");
+    if (uses != nullptr && solver != Solver::robust)
+        throw InputError("least squares does not tell shadows and highlights from other samples",
+                         "use the robust solver for it: --solver robust");
     if (band_rows < 0)
         throw InputError(fmt::format("band_rows is {}", band_rows), "allowed: 1 or more, or 0 for as many as fit");
 }

@@ -8,6 +8,7 @@
 #include "processing/maps/photo_source.h"
 #include "processing/normals/light_field.h"
 #include "processing/normals/sample_model.h"
+#include "processing/normals/sample_use.h"
 
 namespace darkbox {
 
@@ -25,7 +26,8 @@ struct PhotometricStereoOptions {
     /// pixel, 4 more where the mask is to be found); what remains bounds the height of the two bands in memory. It does
     /// not change results.
     int memory_mib = 2048;
-    int band_rows = 0;  ///< rows of a band; 0: as memory_mib allows. It does not change results.
+    int band_rows = 0;              ///< rows of a band; 0: as memory_mib allows. It does not change results.
+    SampleUseSink* uses = nullptr;  ///< is told of every sample; the robust solver's alone
 
     /// Throws InputError that names the field and the allowed range.
     void validate() const;

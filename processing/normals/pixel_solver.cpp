@@ -200,6 +200,13 @@ std::optional<Eigen::Vector3f> PixelSolver::best_start() {
     return band_fit(0.0F, 1.0F);
 }
 
+SampleUse PixelSolver::use(std::size_t i) const {
+    if (!samples.usable[i]) return SampleUse::clipped;
+    if (weight_[i] > 0) return SampleUse::kept;
+    const bool faces_light = lit_[i] && cosine_[i] > terminator_cosine;
+    return faces_light && residual_[i] > 0 ? SampleUse::highlight : SampleUse::shadow;
+}
+
 std::vector<float> PixelSolver::lit_residuals() const {
     std::vector<float> residuals;
     for (const std::size_t i : order_)

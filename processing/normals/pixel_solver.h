@@ -7,6 +7,7 @@
 
 #include "processing/normals/body_law.h"
 #include "processing/normals/gloss_law.h"
+#include "processing/normals/sample_use.h"
 
 namespace darkbox {
 
@@ -59,6 +60,8 @@ public:
     /// After a solve: each sample's weight (relative), and the body's factor in its direction.
     const std::vector<float>& weights() const { return weight_; }
     const std::vector<float>& factors() const { return factor_; }
+    /// After a solve that gave a normal.
+    SampleUse use(std::size_t i) const;
     /// After a solve: value less the fit.
     float residual(std::size_t i) const { return residual_[i]; }
     float cosine(std::size_t i) const { return cosine_[i]; }

@@ -227,13 +227,17 @@ NormalsSummary summary_of(const Session& session, const SolvedSession& solved, c
 
 }  // namespace
 
-NormalsSummary run_normals(const Session& session, const NormalsOptions& options, const WorkContext& work) {
-    options.stereo.validate();
+NormalsSummary run_normals(const Session& session, const NormalsOptions& given, const WorkContext& work) {
+    given.stereo.validate();
     const ResultFiles files(session.folder());
     require_made(files.calibration, session, "calibrate");
     Stopwatch watch;
     auto photos = std::make_unique<SessionPhotos>(session);
     const cv::Size size = photos->size();
+    NormalsOptions options = given;
+    std::optional<SampleUses> uses;
+    if (options.shadows) options.stereo.uses = &uses.emplace(files.shadows, size, photos->count());
+    options.stereo.validate();
     const auto require_height = [&](const cv::Mat1b& object) {
         if (options.surface)
             require_memory_for_height(cv::boundingRect(object), size, options.stereo.memory_mib, without_surface);
@@ -250,7 +254,8 @@ NormalsSummary run_normals(const Session& session, const NormalsOptions& options
     summary.removed = remove_derived(session, {"texels", "shading"});
     write_maps(files, solved.stereo, work);
     release_confidence(solved.stereo);
-    for (const auto& stale : {files.height, files.surface}) std::filesystem::remove(stale);
+    for (const auto& stale : {files.height, files.surface, files.shadows}) std::filesystem::remove_all(stale);
+    if (uses) summary.shadows = uses->write(summary.lights, solved.stereo.normals.valid, work);
     if (options.surface) summary.height = write_surface(files, solved.stereo, solved.calibration.view, work);
     summary.seconds.write = watch.lap();
     write_json(files.results_summary, to_json(summary));

@@ -24,6 +24,7 @@ ResultFiles::ResultFiles(const fs::path& s)
       confidence(s / "results/confidence.exr"),
       height(s / "results/height.exr"),
       surface(s / "results/surface.ply"),
+      shadows(s / "results/shadows"),
       results_summary(s / "results/summary.json"),
       index(s / "texels/index.png"),
       texels(s / "texels/texels.json"),

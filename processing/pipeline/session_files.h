@@ -23,7 +23,8 @@ inline constexpr const char* given_ball = "given/ball.json";
 struct ResultFiles {
     explicit ResultFiles(const std::filesystem::path& session);
     std::filesystem::path calibration, lights_lp, ball_picture, calibration_summary;
-    std::filesystem::path normals, normals_png, albedo, albedo_png, confidence, height, surface, results_summary;
+    std::filesystem::path normals, normals_png, albedo, albedo_png, confidence, height, surface, shadows,
+        results_summary;
     std::filesystem::path index, texels;
     std::filesystem::path shading, shading_json, shading_albedo, shading_summary;
     std::filesystem::path results_folder, report;

@@ -13,6 +13,7 @@
 #include "processing/formats/ply.h"
 #include "processing/normals/photometric_stereo.h"
 #include "processing/pipeline/intensities.h"
+#include "processing/pipeline/sample_uses.h"
 #include "processing/relight/relight.h"
 #include "processing/shading/shading.h"
 #include "processing/texels/texels.h"
@@ -59,7 +60,8 @@ CalibrateSummary run_calibrate(const Session& session, const CalibrateOptions& o
 struct NormalsOptions {
     PhotometricStereoOptions stereo;
     IntensityChoice intensities = IntensityChoice::automatic;
-    bool surface = true;  ///< also integrate the height and write height.exr and surface.ply
+    bool surface = true;   ///< also integrate the height and write height.exr and surface.ply
+    bool shadows = false;  ///< also write results/shadows; the robust solver's alone
 };
 
 /// results/height.exr (channel Y: z in the viewer frame) and results/surface.ply.
@@ -83,6 +85,7 @@ struct NormalsSummary {
     double residual_rms = 0;                       ///< linear radiance
     std::optional<double> mean_angular_error_deg;  ///< where truth came with the pictures
     std::optional<HeightFacts> height;             ///< none where the surface was left out
+    std::vector<SampleShares> shadows;  ///< of each photograph that was used; empty where they were not asked for
     StageSeconds seconds;
     double intensity_seconds = 0;            ///< of estimating the lamps' intensities
     double megapixel_images_per_second = 0;  ///< of the solver
@@ -90,7 +93,8 @@ struct NormalsSummary {
     std::vector<std::string> removed;  ///< folders made with the normals of before
 };
 /// Writes results/normals.exr, normals.png, albedo.exr, albedo.png, confidence.exr (lights used, residual, predicted
-/// standard deviation in degrees), height.exr, surface.ply. Intensities that are estimated here go into
+/// standard deviation in degrees), height.exr, surface.ply, and shadows/ where asked for: a picture for each photograph
+/// of what the solver made of its samples (SampleUse). Intensities that are estimated here go into
 /// calibration/lights.json, where later stages find them.
 NormalsSummary run_normals(const Session& session, const NormalsOptions& options = {}, const WorkContext& work = {});
 

@@ -91,6 +91,12 @@ ordered_json to_json(const NormalsSummary& summary) {
                       {"warnings", summary.warnings},
                       {"removed", summary.removed}};
     json["seconds"]["intensities"] = summary.intensity_seconds;
+    for (const SampleShares& one : summary.shadows)
+        json["shadows"].push_back({{"file", one.file},
+                                   {"kept", one.kept},
+                                   {"shadow", one.shadow},
+                                   {"highlight", one.highlight},
+                                   {"clipped", one.clipped}});
     if (summary.height) json["height"] = height_json(*summary.height);
     if (summary.mean_angular_error_deg) json["mean_angular_error_deg"] = *summary.mean_angular_error_deg;
     return json;

@@ -147,6 +147,8 @@ void add_normals_options(CLI::App& command, StageArguments& a) {
         ->transform(one_of(solvers));
     command.add_flag_callback(
         "--no-surface", [&a] { a.options.normals.surface = false; }, "Leave out height.exr and surface.ply");
+    command.add_flag("--shadows", a.options.normals.shadows,
+                     "With --solver robust: also results/shadows, what each photograph's samples were taken for");
     const std::map<std::string, IntensityChoice> choices{{"auto", IntensityChoice::automatic},
                                                          {"given", IntensityChoice::given},
                                                          {"estimate", IntensityChoice::estimate}};

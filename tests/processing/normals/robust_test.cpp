@@ -48,6 +48,60 @@ TEST(Robust, ExactLambertSphereWithAttachedShadows) {
     EXPECT_EQ(result.lights_used(24, 24), 24);
 }
 
+class KeepUses : public SampleUseSink {
+public:
+    KeepUses(std::size_t photographs, cv::Size size) : pictures(photographs, cv::Mat1b(size, uchar{1})) {
+        for (cv::Mat1b& picture : pictures) picture = picture.clone();
+    }
+    void take(int row, std::size_t photograph, std::span<const SampleUse> uses) override {
+        std::memcpy(pictures[photograph].ptr(row), uses.data(), uses.size());
+    }
+    SampleUse at(std::size_t photograph, int y, int x) const {
+        return static_cast<SampleUse>(pictures[photograph](y, x));
+    }
+
+    std::vector<cv::Mat1b> pictures;
+};
+
+TEST(Robust, TellsWhatItTookEachSampleFor) {
+    LitSphere sphere(spiral_lights(24), test::lambert);
+    sphere.lights[7].used = false;
+    sphere.stack.images[5](24, 20) *= 3.0F;
+    sphere.stack.clipped[6](24, 20) = 255;
+    sphere.stack.images[8](24, 20) *= 0.3F;  // something is in the light's way
+    KeepUses uses(24, sphere.stack.mask.size());
+    PhotometricStereoOptions options = with(Solver::robust);
+    options.uses = &uses;
+    options.band_rows = 5;
+    photometric_stereo(sphere.stack, sphere.lights, options);
+    EXPECT_EQ(uses.at(4, 24, 20), SampleUse::kept);
+    EXPECT_EQ(uses.at(5, 24, 20), SampleUse::highlight);
+    EXPECT_EQ(uses.at(6, 24, 20), SampleUse::clipped);
+    EXPECT_EQ(uses.at(7, 24, 20), static_cast<SampleUse>(1)) << "nothing is said of a light that is not used";
+    EXPECT_EQ(uses.at(8, 24, 20), SampleUse::shadow);
+    EXPECT_EQ(uses.at(5, 0, 0), SampleUse::no_normal);
+    for (const std::size_t i : {0U, 12U, 23U})
+        for (int y = 0; y < 48; ++y)
+            for (int x = 0; x < 48; ++x) {
+                if (!sphere.stack.mask(y, x) || (y == 24 && x == 20)) continue;
+                const double cosine = sphere.normal(y, x).dot(sphere.lights[i].direction);
+                if (cosine < 0.1) {
+                    EXPECT_EQ(uses.at(i, y, x), SampleUse::shadow) << i << ' ' << y << ' ' << x;
+                }
+                if (cosine > 0.2) {
+                    EXPECT_EQ(uses.at(i, y, x), SampleUse::kept) << i << ' ' << y << ' ' << x;
+                }
+            }
+}
+
+TEST(Robust, LeastSquaresTellsNothingOfSamples) {
+    const LitSphere sphere(spiral_lights(6), test::lambert);
+    KeepUses uses(6, sphere.stack.mask.size());
+    PhotometricStereoOptions options = with(Solver::lsq);
+    options.uses = &uses;
+    EXPECT_THROW(photometric_stereo(sphere.stack, sphere.lights, options), InputError);
+}
+
 TEST(Robust, HighlightsAreLeftOut) {
     for (const double strength : {0.3, 0.6})
         for (const double exponent : {10.0, 30.0, 100.0}) {
