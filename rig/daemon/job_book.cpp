@@ -28,7 +28,7 @@ JobBook::JobBook(Catalog& catalog, EventLog& log, std::size_t kept)
             keep(job);
             note(job.id, fmt::format("darkboxd ended while this ran; now {}", name(job.state)));
         }
-        if (!job.ended_already()) live_.emplace(job.id, Live{job, {}});
+        if (!job.ended_already()) live_.emplace(job.id, Live{job});
     }
 }
 
@@ -41,7 +41,7 @@ Job JobBook::add(Job job) {
         job.attempts = 1;
     }
     job.id = store_.add(job);
-    live_.emplace(job.id, Live{job, {}});
+    live_.emplace(job.id, Live{job});
     wake_.notify_all();
     return job;
 }
@@ -78,13 +78,15 @@ bool JobBook::wait_for_queued(Lane lane, const std::stop_token& stop) const {
     });
 }
 
-void JobBook::put_back(std::uint64_t id) {
+bool JobBook::put_back(std::uint64_t id) {
     const std::scoped_lock lock(mutex_);
     Live& entry = live(id);
+    if (entry.cancelled) return false;
     entry.job.state = JobState::queued;
     entry.job.attempts = std::max(0, entry.job.attempts - 1);
     entry.stop = std::stop_source();
     store_.save(entry.job);
+    return true;
 }
 
 JobBook::Live& JobBook::live(std::uint64_t id) {
@@ -140,6 +142,7 @@ Job JobBook::cancel(std::uint64_t id) {
         const std::scoped_lock lock(mutex_);
         const auto found = live_.find(id);
         if (found == live_.end()) return job;  // it ended just now
+        found->second.cancelled = true;
         found->second.stop.request_stop();
         job = found->second.job;
         if (job.state != JobState::queued) return job;
@@ -190,7 +193,7 @@ void JobBook::keep(Job& job) {
     next->created = iso8601_now();
     next->event = log_.last();
     next->id = store_.save_with_next(job, *next);
-    live_.emplace(next->id, Live{*next, {}});
+    live_.emplace(next->id, Live{*next});
     wake_.notify_all();
 }
 

@@ -43,8 +43,9 @@ public:
     bool has_queued(Lane lane) const;
     /// Waits until take() would give one, or the token stops. Whether there is one.
     bool wait_for_queued(Lane lane, const std::stop_token& stop) const;
-    /// Puts a running job back to its place in the queue; it does not count as begun.
-    void put_back(std::uint64_t id);
+    /// Puts a running job back to its place in the queue; it does not count as begun. False, and nothing is done, where
+    /// somebody cancelled it.
+    bool put_back(std::uint64_t id);
 
     Job find(std::uint64_t id) const;
     std::vector<Job> list(const PageRequest& page) const;
@@ -74,7 +75,8 @@ public:
 private:
     struct Live {
         Job job;
-        std::stop_source stop;
+        std::stop_source stop = {};
+        bool cancelled = false;  ///< by somebody's wish
     };
     Live& live(std::uint64_t id);
     void keep(Job& job);

@@ -39,8 +39,9 @@ void ProcessingLane::perform(Job job, const std::stop_token& stop) {
                           [&](const std::string& line) { book_.note(job.id, line); });
     });
     if (failure && failure->cancelled && stop.stop_requested()) {
-        (void)attempt([&] { book_.put_back(job.id); });  // else a restart finds it cut off, and queues it as well
-        return;
+        bool goes_on = true;
+        (void)attempt([&] { goes_on = book_.put_back(job.id); });  // else a restart finds it cut off, and queues it
+        if (goes_on) return;
     }
     (void)attempt([&] { job.session.empty() ? catalog_.refresh() : catalog_.refresh(job.session); });
     job.state = !failure ? JobState::done : failure->cancelled ? JobState::cancelled : JobState::failed;

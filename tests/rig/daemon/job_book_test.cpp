@@ -143,10 +143,18 @@ TEST_F(JobBookTest, PutBackDoesNotCountAsAnAttempt) {
     const Job job = restart().add(process("a"));
     for (int i = 0; i < 5; ++i) {
         ASSERT_TRUE(book_->take(Lane::processing)) << i;
-        book_->put_back(job.id);
+        EXPECT_TRUE(book_->put_back(job.id));
         restart();
     }
     EXPECT_EQ(book_->take(Lane::processing)->attempts, 1);
+}
+
+TEST_F(JobBookTest, WhatSomebodyCancelledIsNotPutBack) {
+    const Job job = restart().add(process("a"));
+    ASSERT_TRUE(book_->take(Lane::processing));
+    book_->cancel(job.id);
+    EXPECT_FALSE(book_->put_back(job.id));
+    EXPECT_EQ(book_->find(job.id).state, JobState::running);
 }
 
 TEST_F(JobBookTest, CancelsWhatWaitsAtOnceAndAsksWhatRuns) {
