@@ -17,7 +17,7 @@ UniqueFd inherited_socket() {
     UniqueFd socket(count == 1 ? SD_LISTEN_FDS_START : -1);
     if (!socket || ::sd_is_socket_unix(socket.get(), SOCK_SEQPACKET, listening, nullptr, 0) <= 0)
         throw InputError("systemd has handed over no listening Unix socket for packets, or more than one",
-                         "sudo systemctl start darkbox-guardian.socket; it starts this program when darkboxd needs it");
+                         "sudo systemctl start darkbox-guardian.socket; whoever comes to it starts this program");
     return socket;
 }
 
@@ -25,7 +25,8 @@ int parse_and_guard(int argc, char** argv) {
     CLI::App app("Holds the lines of GPIO lamps for darkboxd, and darkens them when it dies or hangs",
                  "darkbox-guardian");
     app.set_version_flag("--version", std::string("darkbox-guardian ") + DARKBOX_VERSION);
-    app.footer("Started by systemd on the socket of darkbox-guardian.socket, /run/darkbox/guardian.sock");
+    app.footer(
+        "Started by systemd with darkboxd, on the socket of darkbox-guardian.socket: /run/darkbox/guardian.sock");
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
