@@ -82,6 +82,13 @@ bool FaultPlan::hits(FaultKind kind, std::uint64_t sequence) const {
     });
 }
 
+bool changes_what_is_seen(const FaultPlan& plan) {
+    return std::any_of(plan.faults.begin(), plan.faults.end(), [](const Fault& fault) {
+        return fault.kind == FaultKind::defocus || fault.kind == FaultKind::camera_knock ||
+               fault.kind == FaultKind::object_knock;
+    });
+}
+
 FaultPlan parse_faults(const std::string& text) {
     FaultPlan plan;
     std::istringstream words(text);

@@ -56,6 +56,9 @@ struct FaultPlan {
     std::optional<double> amount(FaultKind kind, std::uint64_t sequence) const;
 };
 
+/// Whether any of them moves or blurs what the camera sees, for which all its colours must be known.
+bool changes_what_is_seen(const FaultPlan& plan);
+
 /// "drop@7", "hang@3x2" (count), "dead-lamp@0:4", "swapped-lamps@0:2,5", "leaking-lamp@0:3,5=0.02" (amount); several
 /// joined by spaces. Throws InputError with the known names. docs/faults.md says what each does to a capture.
 FaultPlan parse_faults(const std::string& text);

@@ -170,11 +170,19 @@ Rgb Renderer::radiance(const Sample& s, const SceneLamp& lamp) const {
 }
 
 std::vector<RgbImage> Renderer::render(std::span<const LampId> lamps) const {
+    std::vector<RgbImage> pictures(lamps.size(), RgbImage(scene_.view.width, scene_.view.height));
+    render(lamps, [&](std::size_t picture, int row, std::span<const float> rgb) {
+        std::copy(rgb.begin(), rgb.end(), pictures[picture].pixel(0, row));
+    });
+    return pictures;
+}
+
+void Renderer::render(std::span<const LampId> lamps, const RowSink& row_done) const {
     const View& view = scene_.view;
-    std::vector<RgbImage> pictures(lamps.size(), RgbImage(view.width, view.height));
     constexpr double share = 1.0 / (rays_per_pixel_side * rays_per_pixel_side);
     for_each_row(view.height, [&](int row) {
         std::vector<Rgb> sums(lamps.size());
+        std::vector<RgbImage> rows(lamps.size(), RgbImage(view.width, 1));
         for (int column = 0; column < view.width; ++column) {
             std::fill(sums.begin(), sums.end(), Rgb{});
             for_each_ray(column, row, [&](double u, double v) {
@@ -182,10 +190,10 @@ std::vector<RgbImage> Renderer::render(std::span<const LampId> lamps) const {
                 for (std::size_t i = 0; i < lamps.size(); ++i)
                     sums[i] += radiance(seen, scene_.lamps.at(lamps[i].value));
             });
-            for (std::size_t i = 0; i < lamps.size(); ++i) pictures[i].set(column, row, sums[i] * share);
+            for (std::size_t i = 0; i < lamps.size(); ++i) rows[i].set(column, 0, sums[i] * share);
         }
+        for (std::size_t i = 0; i < lamps.size(); ++i) row_done(i, row, rows[i].samples);
     });
-    return pictures;
 }
 
 /// As in SceneTruth, of what a ray that meets the object shows.

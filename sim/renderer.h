@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -23,6 +25,10 @@ struct SceneTruth {
     std::vector<std::uint16_t> materials;  ///< of the texture where the pixel's centre shows it, from 1; 0 = outside
 };
 
+/// Takes one row of one of the pictures asked for, counted from 0: interleaved RGB. Called on any thread, once for
+/// each.
+using RowSink = std::function<void(std::size_t picture, int row, std::span<const float> rgb)>;
+
 /// Traces rays from the camera: direct light with shadows, and one reflection on the mirror balls. Interreflection on
 /// the object is left out, so that Lambert's and Phong's laws hold exactly. Refers to the scene. The same bits on any
 /// number of threads; const members are thread-safe.
@@ -32,6 +38,8 @@ public:
 
     /// One picture for each of these lamps, burning alone at full level: radiance, linear.
     std::vector<RgbImage> render(std::span<const LampId> lamps) const;
+    /// The same row by row, for who does not keep them as they are.
+    void render(std::span<const LampId> lamps, const RowSink& row_done) const;
     SceneTruth truth() const;
 
 private:

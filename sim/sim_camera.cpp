@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numeric>
+#include <bit>
 #include <stdexcept>
 #include <utility>
 
@@ -17,15 +17,26 @@ constexpr double warming_half_s = 30;  ///< after which half of what a cold sens
 
 constexpr FrameControls power_on_controls{Seconds{0.02}, 1.0};
 
-PixelFormat format_of(const Sensor& sensor) { return sensor.bit_depth > 8 ? PixelFormat::rgb16 : PixelFormat::rgb8; }
+PixelFormat format_of(const SimCameraOptions& options) {
+    const bool wide = options.sensor.bit_depth > 8;
+    switch (options.colour) {
+        case SensorColour::grey:
+            return wide ? PixelFormat::grey16 : PixelFormat::grey8;
+        case SensorColour::rggb:
+            return wide ? PixelFormat::rggb16 : PixelFormat::rggb8;
+        case SensorColour::rgb:
+            break;
+    }
+    return wide ? PixelFormat::rgb16 : PixelFormat::rgb8;
+}
+
+static_assert(std::endian::native == std::endian::little, "Frame samples are little-endian words");
 
 std::vector<std::byte> as_bytes(const std::vector<std::uint16_t>& samples, PixelFormat format) {
-    std::vector<std::byte> bytes;
-    bytes.reserve(samples.size() * static_cast<std::size_t>(bytes_per_sample(format)));
-    for (const std::uint16_t sample : samples) {
-        bytes.push_back(static_cast<std::byte>(sample & 0xFFU));
-        if (format == PixelFormat::rgb16) bytes.push_back(static_cast<std::byte>(sample >> 8U));
-    }
+    const auto words = std::as_bytes(std::span(samples));
+    if (bytes_per_sample(format) == 2) return {words.begin(), words.end()};
+    std::vector<std::byte> bytes(samples.size());
+    std::transform(samples.begin(), samples.end(), bytes.begin(), [](std::uint16_t s) { return std::byte(s & 0xFFU); });
     return bytes;
 }
 
@@ -37,14 +48,17 @@ void damage(std::vector<std::byte>& bytes) {
 
 }  // namespace
 
-SimCamera::SimCamera(const Scene& scene, LampWitness& lamps, SimClock& clock, SimCameraOptions options)
+SimCamera::SimCamera(const Scene& scene, std::shared_ptr<LampPictures> pictures, LampWitness& lamps, SimClock& clock,
+                     SimCameraOptions options)
     : scene_(scene),
+      pictures_(std::move(pictures)),
       lamps_(lamps),
       clock_(clock),
       options_(std::move(options)),
       controls_(power_on_controls),
       controls_before_(power_on_controls),
       waits_hung_(options_.faults.faults.size(), 0) {
+    if (options_.quick_noise) quick_.emplace(options_.sensor.seed);
     lamps_.set_strobe_source([this] { strobe_until_now(); });
 }
 
@@ -66,7 +80,7 @@ CameraInfo SimCamera::configure(const CameraConfig& config) {
     info.driver = "sim";
     info.width = scene_.view.width;
     info.height = scene_.view.height;
-    info.format = format_of(options_.sensor);
+    info.format = format_of(options_);
     info.bit_depth = options_.sensor.bit_depth;
     info.black_level = options_.sensor.black_level;
     info.frame_period = std::max({options_.shortest_period, controls_.exposure + options_.readout,
@@ -89,7 +103,7 @@ void SimCamera::start() {
     first_sequence_ = next_strobe_ = next_sequence_;
     queue_.clear();
     // Now, while nobody waits with a lamp lit: in real time the rendering takes longer than a lamp may be on.
-    if (!scene_.lamps.empty()) picture_of(LampId{0});
+    if (!scene_.lamps.empty()) pictures_->of(LampId{0});
     lamps_.strobe_runs(stream_start_, period_, to_nanoseconds(controls_.exposure));
 }
 
@@ -216,12 +230,10 @@ Frame SimCamera::deliver(const Exposure& e) {
     Frame frame;
     frame.width = scene_.view.width;
     frame.height = scene_.view.height;
-    frame.format = format_of(sensor);
+    frame.format = format_of(options_);
     frame.bit_depth = sensor.bit_depth;
     frame.black_level = options_.sensor.black_level;
-    frame.pixels = as_bytes(expose(sensor, seen(light_of(burning), picture.sequence),
-                                   {picture.controls.exposure.count(), picture.controls.gain, picture.sequence}),
-                            frame.format);
+    frame.pixels = as_bytes(samples_of(picture, burning, sensor), frame.format);
     frame.sequence = counted(e.sequence);
     frame.timestamp = e.interval.begin;
     frame.exposure = e.interval;
@@ -233,28 +245,41 @@ Frame SimCamera::deliver(const Exposure& e) {
     return frame;
 }
 
-RgbImage SimCamera::light_of(const std::vector<LampShare>& burning) {
-    RgbImage sum(scene_.view.width, scene_.view.height);
-    std::vector<LampShare> lights = burning;
+std::vector<LightShare> SimCamera::lights_of(const std::vector<LampShare>& burning) {
+    std::vector<LightShare> lights;
+    for (const LampShare& b : burning) lights.push_back({static_cast<float>(b.share), pictures_->of(b.lamp)});
     if (options_.room_light > 0)
         for (std::uint32_t lamp = 0; lamp < scene_.lamps.size(); ++lamp)
-            lights.push_back({LampId{lamp}, options_.room_light});
-    for (const LampShare& b : lights) {
-        const RgbImage& picture = picture_of(b.lamp);
-        const auto share = static_cast<float>(b.share);
-        for (std::size_t i = 0; i < sum.samples.size(); ++i) sum.samples[i] += share * picture.samples[i];
-    }
+            lights.push_back({static_cast<float>(options_.room_light), pictures_->of(LampId{lamp})});
+    return lights;
+}
+
+std::vector<float> SimCamera::sum_of(const std::vector<LightShare>& lights) const {
+    const auto pixels = static_cast<std::size_t>(scene_.view.width) * static_cast<std::size_t>(scene_.view.height);
+    std::vector<float> sum(pixels * static_cast<std::size_t>(samples_per_pixel(pictures_->colour())), 0.0F);
+    for (const LightShare& light : lights)
+        for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += light.share * light.radiance[i];
     return sum;
 }
 
-const RgbImage& SimCamera::picture_of(LampId lamp) {
-    if (pictures_.empty()) {
-        // All at once: the rays from the camera are then traced once, not once for each lamp.
-        std::vector<LampId> all(scene_.lamps.size());
-        for (std::size_t i = 0; i < all.size(); ++i) all[i].value = static_cast<std::uint32_t>(i);
-        pictures_ = Renderer(scene_).render(all);
+std::vector<std::uint16_t> SimCamera::samples_of(const Exposure& picture, const std::vector<LampShare>& burning,
+                                                 const Sensor& sensor) {
+    const ExposureSetting setting{picture.controls.exposure.count(), picture.controls.gain, picture.sequence};
+    const auto pixels = static_cast<std::size_t>(scene_.view.width) * static_cast<std::size_t>(scene_.view.height);
+    std::vector<LightShare> lights = lights_of(burning);
+    std::vector<float> light;
+    if (changes_what_is_seen(options_.faults)) {
+        RgbImage sum(scene_.view.width, scene_.view.height);
+        sum.samples = sum_of(lights);
+        light = sampled(seen(std::move(sum), picture.sequence), options_.colour);
+        lights = {{1.0F, light}};
+    } else if (!quick_) {
+        light = sum_of(lights);
     }
-    return pictures_.at(lamp.value);
+    if (!quick_) return expose(sensor, std::span<const float>(light), setting);
+    std::vector<std::uint16_t> samples(pixels * static_cast<std::size_t>(samples_per_pixel(options_.colour)));
+    quick_->expose(sensor, lights, setting, samples);
+    return samples;
 }
 
 }  // namespace darkbox::sim

@@ -2,13 +2,15 @@
 
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "acquisition/camera/camera.h"
 #include "sim/faults.h"
+#include "sim/lamp_pictures.h"
 #include "sim/lamp_witness.h"
-#include "sim/renderer.h"
+#include "sim/quick_sensor.h"
 #include "sim/sensor.h"
 #include "sim/sim_clock.h"
 
@@ -16,8 +18,10 @@ namespace darkbox::sim {
 
 struct SimCameraOptions {
     Sensor sensor;
-    int latency_frames = 1;  ///< exposures after start() that still have the controls from before configure()
-    int queue_depth = 2;     ///< finished frames that wait; while the queue is full new ones are lost
+    SensorColour colour = SensorColour::rgb;
+    bool quick_noise = false;  ///< by QuickSensor
+    int latency_frames = 1;    ///< exposures after start() that still have the controls from before configure()
+    int queue_depth = 2;       ///< finished frames that wait; while the queue is full new ones are lost
     Seconds shortest_period{1.0 / 30};
     Seconds shortest_exposure{20e-6};
     Seconds longest_exposure{60};
@@ -35,11 +39,14 @@ struct ExposureTruth {
 
 /// A free-running camera with a global shutter and a strobe line to the lamps that sees the scene in the light that the
 /// lamps really gave during each exposure. Timestamps are the start of the exposure; sequences go on counting over
-/// stop() and start(). Refers to scene, lamps and clock. Configuring again is allowed while not streaming.
+/// stop() and start(). Refers to scene, lamps and clock; others may have the pictures, too, of the same scene and of
+/// the options' colour, or of rgb where the faults move or blur what is seen. Configuring again is allowed while not
+/// streaming.
 /// Thread-compatible.
 class SimCamera final : public Camera {
 public:
-    SimCamera(const Scene& scene, LampWitness& lamps, SimClock& clock, SimCameraOptions options);
+    SimCamera(const Scene& scene, std::shared_ptr<LampPictures> pictures, LampWitness& lamps, SimClock& clock,
+              SimCameraOptions options);
     ~SimCamera() override;
 
     CameraInfo configure(const CameraConfig& config) override;
@@ -70,13 +77,17 @@ private:
     void fail_while_unplugged();
     std::uint64_t counted(std::uint64_t sequence) const;
     RgbImage seen(RgbImage light, std::uint64_t sequence) const;
-    RgbImage light_of(const std::vector<LampShare>& burning);
-    const RgbImage& picture_of(LampId lamp);
+    std::vector<LightShare> lights_of(const std::vector<LampShare>& burning);
+    std::vector<float> sum_of(const std::vector<LightShare>& lights) const;
+    std::vector<std::uint16_t> samples_of(const Exposure& picture, const std::vector<LampShare>& burning,
+                                          const Sensor& sensor);
 
     const Scene& scene_;
+    std::shared_ptr<LampPictures> pictures_;
     LampWitness& lamps_;
     SimClock& clock_;
     SimCameraOptions options_;
+    std::optional<QuickSensor> quick_;
     State state_ = State::closed;
     FrameControls controls_;         ///< asked for
     FrameControls controls_before_;  ///< in effect for the first frames after start()
@@ -89,7 +100,6 @@ private:
     std::deque<Exposure> queue_;
     std::vector<std::uint64_t>
         waits_hung_;  ///< for each fault of the plan; of an unplugged camera: calls that failed, and starts
-    std::vector<RgbImage> pictures_;  ///< one for each lamp, made when the first is needed
     std::vector<ExposureTruth> exposures_;
 };
 

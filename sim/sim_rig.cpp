@@ -39,30 +39,49 @@ Sensor sensor_of(const SimDescription& sim) {
 
 SimRig SimRig::make(const RigDescription& rig, const FaultPlan& more_faults) {
     validate(rig.sim);
-    FaultPlan faults = parse_faults(rig.sim.faults);
-    faults.faults.insert(faults.faults.end(), more_faults.faults.begin(), more_faults.faults.end());
+    SimRig scene;
+    scene.description_ = std::make_shared<const RigDescription>(rig);
+    scene.faults_ = parse_faults(rig.sim.faults);
+    scene.faults_.faults.insert(scene.faults_.faults.end(), more_faults.faults.begin(), more_faults.faults.end());
+    scene.scene_ =
+        std::make_shared<const Scene>(scene_by_name(rig.sim, rig.lamps, rig.ball_diameter_mm.value_or(36.0)));
+    const SensorColour colour = sensor_colour_from_name(rig.sim.colour);
+    scene.pictures_ =
+        std::make_shared<LampPictures>(scene.scene_, changes_what_is_seen(scene.faults_) ? SensorColour::rgb : colour);
+    return make_again(scene);
+}
+
+SimRig SimRig::make_again(const SimRig& other) {
+    const RigDescription& rig = *other.description_;
     SimRig result;
-    result.scene_ =
-        std::make_unique<const Scene>(scene_by_name(rig.sim, rig.lamps, rig.ball_diameter_mm.value_or(36.0)));
+    result.description_ = other.description_;
+    result.faults_ = other.faults_;
+    result.scene_ = other.scene_;
+    result.pictures_ = other.pictures_;
     result.clock_ =
         std::make_unique<SimClock>(rig.sim.real_time ? SimClock::Pace::real_time : SimClock::Pace::virtual_time);
-    result.lamps_ = std::make_unique<SimLamps>(rig.lamps.size(), *result.clock_, faults);
+    result.lamps_ = std::make_unique<SimLamps>(rig.lamps.size(), *result.clock_, result.faults_);
     SimCameraOptions options;
     options.sensor = sensor_of(rig.sim);
+    options.colour = sensor_colour_from_name(rig.sim.colour);
+    options.quick_noise = rig.sim.quick_noise;
     options.latency_frames = rig.sim.latency_frames;
     options.queue_depth = rig.sim.queue_depth;
     options.room_light = rig.sim.room_light;
-    options.faults = faults;
+    options.faults = result.faults_;
     if (!rig.sim.lamps_seen.empty()) result.seen_ = std::make_unique<SeenLamps>(rig);
     LampWitness& witness = result.seen_ ? static_cast<LampWitness&>(*result.seen_) : *result.lamps_;
-    result.camera_ = std::make_unique<SimCamera>(*result.scene_, witness, *result.clock_, options);
-    result.door_ = std::make_unique<SimDoor>(*result.camera_, faults);
+    result.camera_ = std::make_unique<SimCamera>(*result.scene_, result.pictures_, witness, *result.clock_, options);
+    result.door_ = std::make_unique<SimDoor>(*result.camera_, result.faults_);
     return result;
 }
 
 SimRig& SimRig::operator=(SimRig&& other) noexcept {
     camera_.reset();  // first: it holds on to the lamps it strobes, and to all else
+    description_ = std::move(other.description_);
+    faults_ = std::move(other.faults_);
     scene_ = std::move(other.scene_);
+    pictures_ = std::move(other.pictures_);
     clock_ = std::move(other.clock_);
     lamps_ = std::move(other.lamps_);
     seen_ = std::move(other.seen_);

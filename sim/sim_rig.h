@@ -5,6 +5,7 @@
 
 #include "rig/description/rig_description.h"
 #include "sim/faults.h"
+#include "sim/lamp_pictures.h"
 #include "sim/scene.h"
 #include "sim/seen_lamps.h"
 #include "sim/sim_camera.h"
@@ -23,8 +24,10 @@ class SimRig {
 public:
     /// The scene, sensor, lamps and faults of the description. Throws InputError for an unknown scene or fault, or a
     /// value out of range.
-    /// The scene is rendered when the first lit frame is asked for.
+    /// The scene is rendered when the camera is started for the first time.
     static SimRig make(const RigDescription& rig, const FaultPlan& more_faults = {});
+    /// A new one of the same description, dark and cold, with no frame delivered, that has this one's rendered scene.
+    static SimRig make_again(const SimRig& other);
 
     SimRig(SimRig&&) noexcept = default;
     SimRig& operator=(SimRig&& other) noexcept;
@@ -43,7 +46,10 @@ public:
 private:
     SimRig() = default;
 
-    std::unique_ptr<const Scene> scene_;
+    std::shared_ptr<const RigDescription> description_;
+    FaultPlan faults_;
+    std::shared_ptr<const Scene> scene_;
+    std::shared_ptr<LampPictures> pictures_;
     std::unique_ptr<SimClock> clock_;
     std::unique_ptr<SimLamps> lamps_;
     std::unique_ptr<SeenLamps> seen_;  ///< what the camera sees instead

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -33,9 +34,10 @@ std::vector<LampId> lamps_named(const RigDescription& rig, const std::vector<std
 CapturePlan plan_capture(const RigDescription& rig, const std::vector<std::string>& lamps = {});
 
 struct CaptureSummary {
-    int taken = 0;     ///< shots acknowledged by this run
-    int resumed = 0;   ///< shots that an earlier run had acknowledged
-    int repeated = 0;  ///< exposures thrown away and taken again
+    int taken = 0;                ///< shots acknowledged by this run
+    int resumed = 0;              ///< shots that an earlier run had acknowledged
+    int repeated = 0;             ///< exposures thrown away and taken again
+    std::size_t most_queued = 0;  ///< bytes of frames that waited for the disk at once
 };
 
 /// The devices that a run drives.

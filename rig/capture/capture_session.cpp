@@ -262,6 +262,7 @@ CapturedSession capture_session(const CaptureRequest& request, const RigDescript
         for (const std::string& note : request.notes) told.note_event(note);
         summary = take_shots(begun, rig, devices, told, work, timings);
         recorder.finish();
+        summary.most_queued = recorder.most_queued();
     }
     const SessionReview review = request.review ? request.review(begun.writer) : SessionReview{};
     for (const std::string& finding : review.findings) {

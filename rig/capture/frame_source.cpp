@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <utility>
 
 #include "acquisition/device/device_error.h"
+#include "rig/capture/picture.h"
 
 namespace darkbox {
 namespace {
@@ -175,17 +175,10 @@ bool FrameSource::is_dark(const Frame& frame) const {
     return count == 0 || sum / count - frame.black_level < least_share * std::exp2(frame.bit_depth);
 }
 
-/// Eight bytes at a time; hashes are compared within one run only.
 void FrameSource::note_picture(const Frame& frame) {
     repeated_.reset();
     if (is_dark(frame)) return;
-    std::uint64_t hash = frame.pixels.size();
-    std::uint64_t word = 0;
-    for (std::size_t i = 0; i < frame.pixels.size(); i += sizeof word) {
-        std::memcpy(&word, frame.pixels.data() + i, std::min(sizeof word, frame.pixels.size() - i));
-        hash = (hash ^ word) * 0x9e3779b97f4a7c15U;
-        hash ^= hash >> 29U;
-    }
+    const std::uint64_t hash = hash_of(frame.pixels);
     for (const auto& [sequence, earlier] : pictures_)
         if (earlier == hash) repeated_ = sequence;
     if (repeated_) ++repeats_;

@@ -1,6 +1,7 @@
 #include "rig/capture/picture.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
@@ -32,6 +33,9 @@ struct RatioSums {
     NoiseRatio ratio() const { return {squared / variance, std::sqrt(2 * variance_squared) / variance}; }
 };
 
+/// Sums in so many lanes do not wait for each other, and fit a processor's vectors.
+constexpr std::size_t lanes = 8;
+
 int block_side(const Picture& picture) {
     const double area = static_cast<double>(picture.columns) * picture.rows;
     return std::clamp(static_cast<int>(std::sqrt(area / wanted_blocks)), 1, largest_block);
@@ -39,6 +43,34 @@ int block_side(const Picture& picture) {
 
 std::size_t at(const Picture& picture, int row, int column) {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(picture.columns) + static_cast<std::size_t>(column);
+}
+
+/// A stretch of at most `largest_block` samples: how two scaled signals differ, and by what variance noise lets them.
+void add_differences(const std::uint16_t* a, const std::uint16_t* b, const std::uint16_t* dark, std::size_t count,
+                     double gain, const NoiseModel& noise, BlockSums& block, RatioSums& pixels) {
+    std::array<double, lanes> difference{}, variance{}, squared{}, variance_squared{};
+    const double scale = 1 + gain * gain;
+    const auto add = [&](std::size_t lane, std::size_t i) {
+        const double signal_a = static_cast<double>(static_cast<int>(a[i]) - static_cast<int>(dark[i]));
+        const double signal_b = gain * static_cast<double>(static_cast<int>(b[i]) - static_cast<int>(dark[i]));
+        const double d = signal_a - signal_b;
+        const double v = noise.variance((signal_a + signal_b) / 2) * scale;
+        difference[lane] += d;
+        variance[lane] += v;
+        squared[lane] += d * d;
+        variance_squared[lane] += v * v;
+    };
+    std::size_t i = 0;
+    for (; i + lanes <= count; i += lanes)
+        for (std::size_t lane = 0; lane < lanes; ++lane) add(lane, i + lane);
+    for (; i < count; ++i) add(0, i);
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+        block.difference += difference[lane];
+        block.variance += variance[lane];
+        pixels.squared += squared[lane];
+        pixels.variance += variance[lane];
+        pixels.variance_squared += variance_squared[lane];
+    }
 }
 
 /// Chroma says nothing of how much light there was.
@@ -115,30 +147,46 @@ Difference compare(const Picture& a, const Picture& b, const Picture& dark, cons
     Difference result;
     const double dark_mean = mean(dark);
     result.gain = (mean(a) - dark_mean) / (mean(b) - dark_mean);
-    const int side = block_side(a);
-    const int across = (a.columns + side - 1) / side;
-    std::vector<BlockSums> blocks(static_cast<std::size_t>(across) *
-                                  static_cast<std::size_t>((a.rows + side - 1) / side));
-    RatioSums pixels;
+    const auto side = static_cast<std::size_t>(block_side(a));
+    const auto columns = static_cast<std::size_t>(a.columns);
+    std::vector<BlockSums> blocks((columns + side - 1) / side);  // of one row of blocks
+    RatioSums pixels, sums;
     for (int row = 0; row < a.rows; ++row) {
-        for (int column = 0; column < a.columns; ++column) {
-            const std::size_t i = at(a, row, column);
-            const double signal_a = static_cast<double>(a.samples[i]) - dark.samples[i];
-            const double signal_b = result.gain * (static_cast<double>(b.samples[i]) - dark.samples[i]);
-            const double difference = signal_a - signal_b;
-            const double variance = noise.variance((signal_a + signal_b) / 2) * (1 + result.gain * result.gain);
-            BlockSums& block = blocks[static_cast<std::size_t>(row / side) * static_cast<std::size_t>(across) +
-                                      static_cast<std::size_t>(column / side)];
-            block.difference += difference;
-            block.variance += variance;
-            pixels.add(difference, variance);
+        const std::size_t first = at(a, row, 0);
+        for (std::size_t block = 0; block < blocks.size(); ++block) {
+            const std::size_t begin = first + block * side;
+            const std::size_t count = std::min(side, columns - block * side);
+            add_differences(&a.samples[begin], &b.samples[begin], &dark.samples[begin], count, result.gain, noise,
+                            blocks[block], pixels);
         }
+        const bool ends = (static_cast<std::size_t>(row) + 1) % side == 0 || row + 1 == a.rows;
+        if (!ends) continue;
+        for (BlockSums& block : blocks) sums.add(block.difference, block.variance);
+        std::fill(blocks.begin(), blocks.end(), BlockSums{});
     }
-    RatioSums sums;
-    for (const BlockSums& block : blocks) sums.add(block.difference, block.variance);
     result.pixels = pixels.ratio();
     result.blocks = sums.ratio();
     return result;
+}
+
+/// Four sums that do not wait for each other, of eight bytes each.
+std::uint64_t hash_of(std::span<const std::byte> bytes) {
+    constexpr std::uint64_t factor = 0x9e3779b97f4a7c15U;
+    const auto mix = [](std::uint64_t hash, std::uint64_t word) {
+        hash = (hash ^ word) * factor;
+        return hash ^ hash >> 29U;
+    };
+    std::array<std::uint64_t, 4> words{}, hashes{1, 2, 3, 4};
+    std::size_t i = 0;
+    for (; i + sizeof words <= bytes.size(); i += sizeof words) {
+        std::memcpy(words.data(), bytes.data() + i, sizeof words);
+        for (std::size_t lane = 0; lane < words.size(); ++lane) hashes[lane] = mix(hashes[lane], words[lane]);
+    }
+    words = {};
+    std::memcpy(words.data(), bytes.data() + i, bytes.size() - i);
+    std::uint64_t hash = bytes.size();
+    for (std::size_t lane = 0; lane < words.size(); ++lane) hash = mix(mix(hash, words[lane]), hashes[lane]);
+    return hash;
 }
 
 double correlation(const Picture& lit, const Picture& brightened_dark, const Picture& dark) {

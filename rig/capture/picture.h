@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "acquisition/frame/frame.h"
@@ -17,6 +19,9 @@ struct Picture {
 
 /// The frame's bytes must be as many as its size and format ask for.
 Picture to_picture(const Frame& frame);
+
+/// Tells a frame's bytes from others within one run; it differs from machine to machine.
+std::uint64_t hash_of(std::span<const std::byte> bytes);
 
 double mean(const Picture& picture);
 

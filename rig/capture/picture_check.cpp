@@ -32,13 +32,6 @@ constexpr const char* unsteady_hint = "raise settle_ms of the lamp, look for fli
 /// A dark frame that a stuck lamp brightens looks like that lamp's picture.
 constexpr double looks_alike = 0.9;
 
-/// FNV-1a over the bytes: the same on every machine.
-std::uint64_t hash_of(const std::vector<std::byte>& bytes) {
-    std::uint64_t hash = 0xcbf29ce484222325u;
-    for (const std::byte b : bytes) hash = (hash ^ std::to_integer<std::uint64_t>(b)) * 0x100000001b3u;
-    return hash;
-}
-
 bool is_noise(const NoiseRatio& ratio, double allowance) {
     return ratio.value < 1.0 + allowance + spreads * ratio.sigma;
 }
@@ -83,13 +76,14 @@ std::string PictureCheck::accept_lit(const std::string& lamp, const Frame& frame
     Picture picture = to_picture(frame);
     const double signal = share(mean(picture) - mean(*dark_));
     check_signal(signal);
-    check_not_repeated(frame, confirming);
+    const std::uint64_t hash = hash_of(frame.pixels);
+    check_not_repeated(hash, frame, confirming);
     const NoiseModel noise = confirming ? check_steady(lamp, picture, to_picture(*confirming)) : noise_.value();
     const std::string unlike = check_not_another_lamp(lamp, picture, noise);
 
     noise_ = noise;
-    for (const Frame* taken : {&frame, confirming})
-        if (taken) seen_.emplace(hash_of(taken->pixels), lamp);
+    seen_.emplace(hash, lamp);
+    if (confirming) seen_.emplace(hash_of(confirming->pixels), lamp);
     shrunken_.push_back({lamp, shrink(picture)});
     std::erase_if(recent_, [&](const LitPicture& lit) { return lit.lamp == lamp; });
     recent_.push_back({lamp, std::move(picture)});
@@ -118,9 +112,9 @@ void PictureCheck::check_signal(double signal) const {
                      "check the lamp, its supply and its wiring; for a dim lamp raise exposure_ms of [camera]");
 }
 
-void PictureCheck::check_not_repeated(const Frame& frame, const Frame* confirming) const {
+void PictureCheck::check_not_repeated(std::uint64_t hash, const Frame& frame, const Frame* confirming) const {
     constexpr const char* hint = "the camera or its driver delivers a picture twice; plug it in again or update it";
-    const auto earlier = seen_.find(hash_of(frame.pixels));
+    const auto earlier = seen_.find(hash);
     if (earlier != seen_.end())
         throw InputError(fmt::format("the frame repeats the frame of lamp '{}' bit for bit", earlier->second), hint);
     if (confirming && frame.pixels == confirming->pixels)

@@ -62,7 +62,7 @@ private:
 
     double share(double difference) const { return difference / (full_scale_ - black_level_); }
     void check_signal(double signal) const;
-    void check_not_repeated(const Frame& frame, const Frame* confirming) const;
+    void check_not_repeated(std::uint64_t hash, const Frame& frame, const Frame* confirming) const;
     NoiseModel check_steady(const std::string& lamp, const Picture& first, const Picture& second) const;
     void check_bands(const std::string& lamp, const Picture& first, const Picture& second,
                      const NoiseModel& noise) const;

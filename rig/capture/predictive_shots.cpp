@@ -32,6 +32,9 @@ Unproven PredictiveShots::take(std::span<const Shot> shots, const ShotSink& prov
     witnesses_.clear();
     repeats_.clear();
     block_ = 0;
+    next_look_ = 0;
+    block_doubt_.clear();
+    check_before_ = check_;
     unproven_ = {};
     const auto give_up = [&](const std::string& reason) {
         unproven_.stay_settled = true;
@@ -52,6 +55,7 @@ Unproven PredictiveShots::take(std::span<const Shot> shots, const ShotSink& prov
     } catch (const DeviceError& error) {
         lamps_.dark();
         settle_blocks(false);
+        check_ = std::move(*check_before_);
         const std::size_t settled = block_ == 0 ? 0 : *witnesses_[block_].before + 1;
         leave(settled, shots_.size(), error.what());
         return unproven_;
@@ -218,16 +222,45 @@ void PredictiveShots::settle_blocks(bool all) {
         Witness& opening = witnesses_[block_];
         Witness& closing = witnesses_[block_ + 1];
         const bool complete = closing.after ? pending_[*closing.after].frame.has_value() : closing.frame.has_value();
-        if (!complete && !all) return;
         const std::size_t first = *opening.after, last = *closing.before + 1;
-        const PictureCheck before = check_;
+        look_at_pictures(last, complete || all);
+        if (!complete && !all) return;
         const std::string doubt = verify(first, last, opening, closing);
         if (!doubt.empty()) {
-            check_ = before;
+            check_ = std::move(*check_before_);
             leave(first, last, doubt);
         }
         for (std::size_t i = first; i < last; ++i) pending_[i].confirming.reset();
         ++block_;
+        begin_block();
+    }
+    look_at_pictures(pending_.size(), false);
+}
+
+void PredictiveShots::begin_block() {
+    next_look_ = witnesses_[block_].after.value_or(pending_.size());
+    block_doubt_.clear();
+    check_before_ = check_;
+}
+
+/// Looks at the pictures of the present block's shots before `last`, in their order: as far as they are there, or at
+/// all of them, where no more of the block's frames come.
+void PredictiveShots::look_at_pictures(std::size_t last, bool all) {
+    for (; next_look_ < last && block_doubt_.empty(); ++next_look_) {
+        Pending& pending = pending_[next_look_];
+        const bool over = all || (next_look_ + 1 < pending_.size() && seen_ >= pending_[next_look_ + 1].first);
+        const bool enough = pending.frame && (check_.knows_noise() || pending.confirming);
+        if (!over && !enough) return;
+        if (!pending.frame) continue;
+        try {
+            if (enough)
+                pending.found = check_.accept_lit(name_of(next_look_), *pending.frame,
+                                                  pending.confirming ? &*pending.confirming : nullptr);
+            else
+                block_doubt_ = fmt::format("lamp '{}': no second frame to learn the noise from", name_of(next_look_));
+        } catch (const InputError& error) {
+            block_doubt_ = error.what();
+        }
     }
 }
 
@@ -240,42 +273,29 @@ void PredictiveShots::leave(std::size_t first, std::size_t last, const std::stri
 
 /// Why the block's frames cannot be believed; empty when they can, and then they are handed on.
 std::string PredictiveShots::verify(std::size_t first, std::size_t last, Witness& opening, Witness& closing) {
-    std::vector<std::string> found(last - first);
     for (const Repeat& repeat : repeats_)
         if (repeat.sequence >= opening.sequence && repeat.sequence <= closing.sequence)
             return *(closing.doubt = repeat.words);
-    try {
-        for (std::size_t i = first; i < last; ++i) {
-            const Pending& pending = pending_[i];
-            if (!pending.frame) continue;
-            if (!check_.knows_noise() && !pending.confirming)
-                return fmt::format("lamp '{}': no second frame to learn the noise from", name_of(i));
-            found[i - first] =
-                check_.accept_lit(name_of(i), *pending.frame, pending.confirming ? &*pending.confirming : nullptr);
-        }
-    } catch (const InputError& error) {
-        closing.doubt = error.what();
-        return error.what();
-    }
+    if (!block_doubt_.empty()) return *(closing.doubt = block_doubt_);
     for (Witness* witness : {&opening, &closing}) {
         if (!witness->doubt) witness->doubt = heard(*witness);
         if (!witness->doubt->empty()) return *witness->doubt;
     }
     for (std::size_t i = first; i < last; ++i) {
-        if (pending_[i].frame)
-            hand_on(i, found[i - first]);
+        if (pending_[i].frame && !pending_[i].found.empty())
+            hand_on(i);
         else
             leave(i, i + 1, fmt::format("lamp '{}': its frame was lost", name_of(i)));
     }
     return "";
 }
 
-void PredictiveShots::hand_on(std::size_t shot, const std::string& found) {
+void PredictiveShots::hand_on(std::size_t shot) {
     Pending& pending = pending_[shot];
     const double after = ms(pending.frame->exposure.begin - pending.on);
     (*proven_)(shots_[shot],
                {std::move(*pending.frame), pending.on, pending.off,
-                fmt::format("exposed {:.1f} ms after the switch, which fell into the gap; {}", after, found)});
+                fmt::format("exposed {:.1f} ms after the switch, which fell into the gap; {}", after, pending.found)});
     pending.frame.reset();
 }
 

@@ -18,7 +18,8 @@ namespace darkbox {
 /// are told apart by the switches as they really were, so a switch that comes late costs a frame and never a wrong one.
 /// The first switch, the last, and one in every block fall into the middle of an exposure: that frame is spoiled and
 /// witnesses that the timestamps tell the truth (switch_witness.h). A block's frames count when both witnesses at its
-/// ends, and every picture in it, agree. Thread-compatible.
+/// ends, and every picture in it, agree. Pictures are looked at while the next is exposed, so that no more than the
+/// witnesses is left to do at a block's end. Thread-compatible.
 class PredictiveShots {
 public:
     /// All references must outlive this.
@@ -43,6 +44,7 @@ private:
         std::uint64_t first = 0;  ///< frames from here on may be this shot's
         std::optional<Frame> frame;
         std::optional<Frame> confirming;  ///< of the very first, whose noise is not known yet
+        std::string found;                ///< of its picture, once that was looked at
         TimePoint on;
         TimePoint off;
     };
@@ -57,8 +59,10 @@ private:
     void await(std::uint64_t sequence);
     std::size_t shots_in_a_block() const;
     void settle_blocks(bool all);
+    void begin_block();
+    void look_at_pictures(std::size_t last, bool all);
     std::string verify(std::size_t first, std::size_t last, Witness& opening, Witness& closing);
-    void hand_on(std::size_t shot, const std::string& found);
+    void hand_on(std::size_t shot);
     std::string heard(const Witness& witness) const;
     struct Repeat {
         std::uint64_t sequence = 0;
@@ -78,12 +82,15 @@ private:
     Clock& clock_;
     std::span<const Shot> shots_;
     const ShotSink* proven_ = nullptr;
-    std::vector<Pending> pending_;    ///< for each shot that was lit
-    std::vector<Witness> witnesses_;  ///< oldest first; block k lies between witnesses k and k + 1
-    std::vector<Repeat> repeats_;     ///< frames that carried a picture of before
-    std::size_t block_ = 0;           ///< the oldest that is not settled
-    std::uint64_t last_frame_ = 0;    ///< that the latest lit shot needs
-    std::uint64_t seen_ = 0;          ///< the latest frame's number
+    std::vector<Pending> pending_;              ///< for each shot that was lit
+    std::vector<Witness> witnesses_;            ///< oldest first; block k lies between witnesses k and k + 1
+    std::vector<Repeat> repeats_;               ///< frames that carried a picture of before
+    std::size_t block_ = 0;                     ///< the oldest that is not settled
+    std::size_t next_look_ = 0;                 ///< the first of its shots whose picture was not looked at
+    std::string block_doubt_;                   ///< what one of its pictures showed that should not be there
+    std::optional<PictureCheck> check_before_;  ///< the block
+    std::uint64_t last_frame_ = 0;              ///< that the latest lit shot needs
+    std::uint64_t seen_ = 0;                    ///< the latest frame's number
     Unproven unproven_;
 };
 

@@ -11,6 +11,7 @@
 
 #include "rig/daemon/metrics.h"
 #include "rig/daemon/open_beneath.h"
+#include "rig/daemon/preview.h"
 #include "rig/daemon/service.h"
 
 namespace darkbox {
@@ -97,6 +98,7 @@ private:
     const RigDescription& rig_;
     Service& service_;
     Metrics& metrics_;
+    mutable Preview preview_;
 };
 
 /// application/problem+json of this HTTP status.

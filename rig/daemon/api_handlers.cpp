@@ -8,7 +8,6 @@
 #include "rig/daemon/api.h"
 #include "rig/daemon/api_words.h"
 #include "rig/daemon/capture_order_json.h"
-#include "rig/daemon/preview.h"
 
 namespace darkbox {
 namespace {
@@ -230,7 +229,7 @@ ApiResponse Api::preview(const Call& call) const {
         throw Rejected{404, "no capture runs, so there is nothing to see", "start one"};
     const fs::path folder = session_path(service_.sessions(), status.running->session);
     std::optional<LatestFrame> frame;
-    if (fs::exists(folder)) frame = latest_frame(folder);
+    if (fs::exists(folder)) frame = preview_.latest(folder);
     if (!frame) throw Rejected{404, "no frame was taken yet", "ask again in a moment"};
     ApiResponse response;
     response.content_type = "image/jpeg";

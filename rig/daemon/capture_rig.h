@@ -15,8 +15,9 @@ namespace darkbox {
 struct CaptureOutcome {
     std::filesystem::path session;
     std::size_t frames = 0;
-    int resumed = 0;   ///< shots that an earlier run had acknowledged
-    int repeated = 0;  ///< exposures thrown away and taken again
+    int resumed = 0;              ///< shots that an earlier run had acknowledged
+    int repeated = 0;             ///< exposures thrown away and taken again
+    std::size_t most_queued = 0;  ///< bytes of frames that waited for the disk at once
     Seconds duration{0};
     std::vector<std::string> findings = {};  ///< what looks wrong with the rig, in words
 };

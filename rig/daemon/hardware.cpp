@@ -58,6 +58,7 @@ CaptureOutcome capture_with(const CaptureDevices& devices, Door* door, CaptureRe
                    .frames = session.frames().size(),
                    .resumed = summary.resumed,
                    .repeated = summary.repeated,
+                   .most_queued = summary.most_queued,
                    .findings = findings};
         readiness.used(d.clock.now());
     });
@@ -72,7 +73,7 @@ public:
         : rig_(rig), sim_(sim::SimRig::make(rig)), driven_(std::move(driven)) {}
 
     CaptureOutcome capture(const CaptureRequest& request, const WorkContext& work) override {
-        sim_ = sim::SimRig::make(rig_);  // its truth is of this capture alone, and its camera is cold
+        sim_ = sim::SimRig::make_again(sim_);  // its truth is of this capture alone, and its camera is cold
         Readiness readiness(rig_.health);
         const CaptureOutcome outcome =
             capture_with({lamps(), sim_.camera(), sim_.clock()}, door(), request, rig_, readiness, work);

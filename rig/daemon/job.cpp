@@ -36,6 +36,7 @@ void add_outcome(const Job& job, nlohmann::json& json) {
     json["frames"] = job.outcome.frames;
     json["resumed"] = job.outcome.resumed;
     json["repeated"] = job.outcome.repeated;
+    json["most_queued_bytes"] = job.outcome.most_queued;
     json["seconds"] = job.outcome.duration.count();
     json["findings"] = job.outcome.findings;
 }

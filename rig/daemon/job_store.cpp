@@ -18,6 +18,7 @@ std::string outcome_text(const Job& job) {
                  {"frames", job.outcome.frames},
                  {"resumed", job.outcome.resumed},
                  {"repeated", job.outcome.repeated},
+                 {"most_queued_bytes", job.outcome.most_queued},
                  {"seconds", job.outcome.duration.count()},
                  {"findings", job.outcome.findings},
                  {"result", job.result},
@@ -36,6 +37,7 @@ void read_outcome(const std::string& outcome, Job& job) {
                    .frames = json.value("frames", std::size_t{0}),
                    .resumed = json.value("resumed", 0),
                    .repeated = json.value("repeated", 0),
+                   .most_queued = json.value("most_queued_bytes", std::size_t{0}),
                    .duration = Seconds(json.value("seconds", 0.0)),
                    .findings = json.value("findings", std::vector<std::string>())};
     job.result = json.value("result", Json());

@@ -113,12 +113,16 @@ std::string jpeg_of(const cv::Mat3f& linear) {
 
 }  // namespace
 
-std::optional<LatestFrame> latest_frame(const fs::path& session) {
+std::optional<LatestFrame> Preview::latest(const fs::path& session) {
     const auto record = last_frame_of(session);
     if (!record || !pixel_format_from_name(record->format)) return std::nullopt;
+    const std::unique_lock lock(mutex_);
+    if (session == session_ && record->file == made_.file && record->sha256 == sha256_) return made_;
     const fs::path file = plain_file_inside(session / "data", record->file);
-    return LatestFrame{
-        .file = record->file, .lamp = record->lamp_name, .bytes = jpeg_of(decimated(read_frame(file, *record)))};
+    made_ = {.file = record->file, .lamp = record->lamp_name, .bytes = jpeg_of(decimated(read_frame(file, *record)))};
+    session_ = session;
+    sha256_ = record->sha256;
+    return made_;
 }
 
 }  // namespace darkbox

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <mutex>
 #include <optional>
 #include <string>
 
@@ -16,7 +17,17 @@ struct LatestFrame {
 
 inline constexpr int preview_side = 640;  ///< pixels
 
-/// No value while nothing was acknowledged. Throws InputError when the frame does not read.
-std::optional<LatestFrame> latest_frame(const std::filesystem::path& session);
+/// Makes each picture once, however many ask for it while it is the last. Thread-safe.
+class Preview {
+public:
+    /// No value while nothing was acknowledged. Throws InputError when the frame does not read.
+    std::optional<LatestFrame> latest(const std::filesystem::path& session);
+
+private:
+    std::mutex mutex_;
+    std::filesystem::path session_;  // guarded by mutex_
+    std::string sha256_;             // guarded by mutex_; of the frame that was made last
+    LatestFrame made_;               // guarded by mutex_
+};
 
 }  // namespace darkbox

@@ -332,14 +332,16 @@ DoorDescription read_door(TomlSection& section, const RigDescription& rig) {
 
 SimDescription read_sim(TomlSection& section) {
     SimDescription sim;
-    section.allow({"scene", "width", "height", "bit_depth", "full_well_e", "read_noise_e", "latency_frames",
-                   "queue_depth", "seed", "room_light", "real_time", "faults", "lamps_seen", "strobe_line"});
+    section.allow({"scene", "width", "height", "colour", "bit_depth", "full_well_e", "read_noise_e", "latency_frames",
+                   "queue_depth", "seed", "room_light", "real_time", "quick_noise", "faults", "lamps_seen",
+                   "strobe_line"});
     const auto whole = [&](const char* key, Allowed<std::int64_t> allowed, int fallback) {
         return static_cast<int>(section.integer(key, allowed).value_or(fallback));
     };
     if (section.has("scene")) sim.scene = section.required_text("scene");
     sim.width = whole("width", {16, 8192}, sim.width);
     sim.height = whole("height", {16, 8192}, sim.height);
+    sim.colour = section.choice("colour", sim.colour, {"rgb", "grey", "rggb"});
     sim.bit_depth = whole("bit_depth", {8, 16}, sim.bit_depth);
     sim.full_well_e = section.number("full_well_e", {100, 10'000'000}).value_or(sim.full_well_e);
     sim.read_noise_e = section.number("read_noise_e", {0, 1000}).value_or(sim.read_noise_e);
@@ -350,6 +352,7 @@ SimDescription read_sim(TomlSection& section) {
     sim.seed =
         static_cast<std::uint64_t>(section.integer("seed", any_seed).value_or(static_cast<std::int64_t>(sim.seed)));
     sim.real_time = section.flag("real_time").value_or(sim.real_time);
+    sim.quick_noise = section.flag("quick_noise").value_or(sim.quick_noise);
     sim.faults = section.text("faults").value_or("");
     sim.lamps_seen = section.text("lamps_seen").value_or("");
     sim.strobe_line = section.text("strobe_line").value_or("");

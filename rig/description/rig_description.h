@@ -115,6 +115,7 @@ struct SimDescription {
     int width = 320;                  ///< pixels
     int height = 240;                 ///< pixels
     double camera_distance_mm = 800;  ///< [camera.intrinsics] distance_mm; of perspective scenes
+    std::string colour = "rgb";       ///< a pixel's samples: "rgb"; one, "grey"; or one behind a mosaic, "rggb"
     int bit_depth = 12;
     double full_well_e = 20000;  ///< electrons at full scale
     double read_noise_e = 5;     ///< electrons, standard deviation
@@ -123,6 +124,7 @@ struct SimDescription {
     std::uint64_t seed = 1;
     double room_light = 0;                ///< what the room adds: this share of every lamp's light, always
     bool real_time = false;               ///< virtual time otherwise
+    bool quick_noise = false;             ///< noise drawn from a table: a frame costs milliseconds
     std::string faults{};                 ///< what is to go wrong; see sim/faults.h
     std::filesystem::path lamps_seen{};   ///< the camera sees the lamps that this file tells of, not simulated ones
     std::filesystem::path strobe_line{};  ///< with lamps_seen: where the camera's strobe line is told

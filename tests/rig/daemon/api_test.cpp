@@ -71,6 +71,7 @@ TEST_F(ApiTest, RunsACaptureToItsEnd) {
     EXPECT_EQ(done.at("frames"), 5);
     EXPECT_EQ(done.at("resumed"), 1);
     EXPECT_EQ(done.at("repeated"), 2);
+    EXPECT_EQ(done.at("most_queued_bytes"), 7);
 }
 
 TEST_F(ApiTest, CancelsACapture) {

@@ -39,7 +39,12 @@ public:
         script_.lit = true;
         ++script_.captures;
         script_.body(request, work);
-        return {.session = request.folder, .frames = 5, .resumed = 1, .repeated = 2, .duration = Seconds(0.5)};
+        return {.session = request.folder,
+                .frames = 5,
+                .resumed = 1,
+                .repeated = 2,
+                .most_queued = 7,
+                .duration = Seconds(0.5)};
     }
 
     void lend(const std::function<void(const CaptureDevices&)>&) override {}

@@ -58,6 +58,8 @@ latency_frames = 2
 queue_depth = 4
 seed = 99
 real_time = true
+quick_noise = true
+colour = "rggb"
 [lamps]
 driver = "sim"
 [[lamps.lamp]]
@@ -91,6 +93,8 @@ settle_ms = 8
     EXPECT_EQ(rig.sim.queue_depth, 4);
     EXPECT_EQ(rig.sim.seed, 99);
     EXPECT_TRUE(rig.sim.real_time);
+    EXPECT_TRUE(rig.sim.quick_noise);
+    EXPECT_EQ(rig.sim.colour, "rggb");
     EXPECT_EQ(rig.lamps_driver, "sim");
     ASSERT_EQ(rig.lamps.size(), 1);
     EXPECT_EQ(rig.lamps[0].name, "north");
