@@ -152,7 +152,11 @@ private:
 }  // namespace
 
 Hardware::Hardware(const RigDescription& rig) : rig_(rig) {
-    if (rig_.lamps_driver == "gpio") guardian_.emplace(gpio_request(rig_), request_gpio_lines);
+    if (rig_.lamps_driver != "gpio") return;
+    if (auto guardian = connect_guardian(guardian_socket()))
+        guardian_.emplace(gpio_request(rig_), request_gpio_lines, std::move(*guardian));
+    else
+        guardian_.emplace(gpio_request(rig_), request_gpio_lines);
 }
 
 std::unique_ptr<LampArray> Hardware::open_lamps() {

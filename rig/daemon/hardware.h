@@ -11,10 +11,11 @@
 namespace darkbox {
 
 /// The devices that a description asks for: the one place that knows the simulator and the real drivers at once. The
-/// constructor opens none of them, but forks the guardian of GPIO lamps, so it must run before any thread starts that
-/// does more than wait for signals. Thread-compatible; outlives what it opened.
+/// constructor opens none of them, but connects to the guardian of GPIO lamps, or forks one where none runs, so it must
+/// run before any thread starts that does more than wait for signals. Thread-compatible; outlives what it opened.
 class Hardware {
 public:
+    /// Throws DeviceError when the guardian that runs does not want it.
     explicit Hardware(const RigDescription& rig);
 
     /// Lamps and camera; after a simulated capture, what is true of it lies in the session's truth/. Throws InputError

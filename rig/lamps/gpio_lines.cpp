@@ -262,7 +262,8 @@ int level(bool active, const GpioLine& line) { return active != line.active_low 
             throw DeviceError(fmt::format("line {} of GPIO chip \"{}\" is held by \"{}\"", request.lines[i].line,
                                           request.chip, holder),
                               fmt::format("stop {}, or wire the lamp to a free line (gpioinfo shows them)",
-                                          holder == consumer ? "the other darkbox program" : "what holds it"));
+                                          holder == consumer ? "the other darkbox program, or the unit darkbox-guardian"
+                                                             : "what holds it"));
         }
     }
     throw_errno("request lines of GPIO chip", fmt::format("\"{}\"", request.chip), error_number);

@@ -11,12 +11,16 @@ namespace darkbox {
 struct GpioLine {
     std::string line;         ///< its name, or its offset in digits
     bool active_low = false;  ///< active means electrically low
+
+    bool operator==(const GpioLine&) const = default;
 };
 
 /// What is asked of the kernel: lines of one chip, in this order.
 struct GpioRequest {
     std::string chip;  ///< the chip's label, as `gpiodetect` shows it: numbers of chips change, labels do not
     std::vector<GpioLine> lines;
+
+    bool operator==(const GpioRequest&) const = default;
 };
 
 /// Lines held as outputs until the destructor releases them. What a released line does is up to the chip, so whoever

@@ -1,160 +1,22 @@
 #include "rig/lamps/guardian_process.h"
 
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <poll.h>
 #include <sys/prctl.h>
+#include <sys/signalfd.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <csignal>
 #include <limits>
-#include <string>
 
-#include "acquisition/device/clock.h"
 #include "acquisition/device/device_error.h"
+#include "rig/lamps/guardian.h"
 
 namespace darkbox {
 namespace {
-
-template <std::size_t Size>
-void put(const std::string& text, std::array<char, Size>& field) {
-    text.copy(field.data(), Size - 1);
-}
-
-class Guardian {
-public:
-    Guardian(int channel, const GpioRequest& request, const RequestLines& request_lines, Nanoseconds silence)
-        : channel_(channel), request_(request), request_lines_(request_lines), silence_(silence) {}
-
-    /// Until the channel closes.
-    void run() {
-        while (hear()) darken_when_overdue();
-        darken();
-    }
-
-private:
-    /// Waits for a command, or for the moment when the lamps must be dark without one.
-    bool hear() {
-        pollfd wait{.fd = channel_, .events = POLLIN, .revents = 0};
-        const int ready = ::poll(&wait, 1, milliseconds_left());
-        if (ready <= 0) return ready == 0 || errno == EINTR;
-        GuardianCommand command;
-        const ssize_t size = ::recv(channel_, &command, sizeof command, 0);
-        if (size < 0 && errno == EINTR) return true;
-        if (size != static_cast<ssize_t>(sizeof command)) return false;
-        heard_ = clock_.now();
-        return command.kind == GuardianCommand::Kind::beat || answer(command);
-    }
-
-    bool answer(const GuardianCommand& command) {
-        GuardianReply reply;
-        try {
-            obey(command);
-        } catch (const Error& error) {
-            reply.failed = 1;
-            put(error.what(), reply.what);
-            put(error.hint(), reply.hint);
-        } catch (const std::exception& error) {
-            reply.failed = 1;
-            put(error.what(), reply.what);
-        }
-        return ::send(channel_, &reply, sizeof reply, MSG_NOSIGNAL) == static_cast<ssize_t>(sizeof reply);
-    }
-
-    void obey(const GuardianCommand& command) {
-        if (command.kind == GuardianCommand::Kind::open) {
-            lines_.reset();
-            lit_ = 0;
-            forced_.clear();
-            lines_ = request_lines_(request_);
-        } else if (command.kind == GuardianCommand::Kind::drive) {
-            drive(command);
-        } else {
-            need_lines();
-            if (!forced_.empty()) refuse_forced();
-        }
-    }
-
-    void need_lines() const {
-        if (lines_) return;
-        throw DeviceError(fmt::format("the lines of GPIO chip \"{}\" are not open", request_.chip),
-                          "check the chip's cable, then darkbox lamps dark opens them again");
-    }
-
-    void drive(const GuardianCommand& command) {
-        need_lines();
-        const std::size_t steps = std::min<std::size_t>(command.steps, GuardianCommand::most_steps);
-        const std::uint64_t last = steps == 0 || command.at_most_ns <= 0 ? 0 : command.step.at(steps - 1);
-        if (last == 0)
-            forced_.clear();
-        else if (!forced_.empty())
-            refuse_forced();
-        const TimePoint until = clock_.now() + Nanoseconds(command.at_most_ns);
-        // Lit again is lit on: the time that a lamp may burn is counted from when it was dark.
-        lit_until_ = last != 0 && last == lit_ ? std::min(lit_until_, until) : until;
-        lit_ = last == 0 ? lit_ : last;  // before the lines change: a failure must find it
-        for (std::size_t i = 0; i < steps; ++i) set(command.step.at(i));
-        if (last == 0) darken_or_throw();
-    }
-
-    void set(std::uint64_t step) {
-        std::vector<bool> active(request_.lines.size());
-        for (std::size_t i = 0; i < active.size(); ++i) active[i] = ((step >> i) & 1U) != 0;
-        try {
-            lines_->set(active);
-        } catch (...) {
-            lines_.reset();  // opened anew, also after a replug, they start dark
-            lit_ = 0;
-            throw;
-        }
-    }
-
-    void darken_or_throw() {
-        set(0);
-        lit_ = 0;
-    }
-
-    void darken() noexcept {
-        try {
-            if (lines_) darken_or_throw();
-        } catch (...) {  // NOLINT(bugprone-empty-catch): the chip is gone, and with it what could be done
-        }
-    }
-
-    TimePoint overdue_at() const { return std::min(lit_until_, heard_ + silence_); }
-
-    int milliseconds_left() const {
-        if (lit_ == 0) return -1;
-        const auto left = std::chrono::ceil<std::chrono::milliseconds>(overdue_at() - clock_.now()).count();
-        return static_cast<int>(std::clamp<std::int64_t>(left, 0, std::numeric_limits<int>::max()));
-    }
-
-    void darken_when_overdue() {
-        const TimePoint now = clock_.now();
-        if (lit_ == 0 || now < overdue_at()) return;
-        forced_ = now >= lit_until_ ? "a lamp was lit for longer than its max_on_s, and was darkened"
-                                    : "the program that drives the lamps fell silent, and they were darkened";
-        darken();
-    }
-
-    [[noreturn]] void refuse_forced() const {
-        throw DeviceError(forced_, "darkbox lamps dark, then go on; raise max_on_s if the lamp bears it");
-    }
-
-    const int channel_;
-    const GpioRequest& request_;
-    const RequestLines& request_lines_;
-    const Nanoseconds silence_;
-    SystemClock clock_;
-    std::unique_ptr<OutputLines> lines_;
-    std::uint64_t lit_ = 0;  ///< the step that is on; 0: dark
-    TimePoint lit_until_;
-    TimePoint heard_;
-    std::string forced_;  ///< why the guardian darkened the lamps; empty: it did not
-};
 
 /// Nothing of the parent's stays open here: a socket or a pipe held by the guardian would hide the parent's death from
 /// whoever waits for it. Returns where the channel is now.
@@ -169,22 +31,92 @@ int keep_only(const UniqueFd& channel) {
     return kept;
 }
 
+/// What ends other programs does not end this one, the two signals aside by which it may be asked to.
 void outlive_the_daemon() {
-    for (const int number : {SIGTERM, SIGINT, SIGHUP, SIGQUIT, SIGPIPE, SIGUSR1, SIGUSR2}) std::signal(number, SIG_IGN);
+    for (const int number : {SIGHUP, SIGQUIT, SIGPIPE, SIGUSR1, SIGUSR2}) std::signal(number, SIG_IGN);
     ::prctl(PR_SET_NAME, "darkbox-guard");
     const UniqueFd score(::open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC));
     // Needs privileges; without them the guardian is still the smaller of the two.
     [[maybe_unused]] const ssize_t ignored = score ? ::write(score.get(), "-1000", 5) : 0;
 }
 
+bool may_command(const UniqueFd& channel) {
+    ucred peer{};
+    socklen_t size = sizeof peer;
+    return ::getsockopt(channel.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 &&
+           (peer.uid == 0 || peer.uid == ::geteuid());
+}
+
+bool greet(const UniqueFd& channel, const GuardianGreeting& greeting) {
+    constexpr int flags = MSG_NOSIGNAL | MSG_DONTWAIT;
+    return ::send(channel.get(), &greeting, sizeof greeting, flags) == static_cast<ssize_t>(sizeof greeting);
+}
+
+/// Whoever waits next. No descriptor where it may not command, or another does already.
+UniqueFd next_daemon(const UniqueFd& listening, const UniqueFd& present) {
+    UniqueFd channel(::accept4(listening.get(), nullptr, nullptr, SOCK_CLOEXEC));
+    if (!channel || !may_command(channel)) return UniqueFd();
+    if (present) {
+        greet(channel,
+              {.reply = guardian_refusal("another darkbox program drives the lamps", "stop it, or have it do this")});
+        return UniqueFd();
+    }
+    return greet(channel, {.process = ::getpid()}) ? std::move(channel) : UniqueFd();
+}
+
+UniqueFd request_to_end() {
+    sigset_t ends{};
+    ::sigemptyset(&ends);
+    ::sigaddset(&ends, SIGTERM);
+    ::sigaddset(&ends, SIGINT);
+    ::sigprocmask(SIG_BLOCK, &ends, nullptr);
+    UniqueFd signals(::signalfd(-1, &ends, SFD_CLOEXEC | SFD_NONBLOCK));
+    if (!signals) throw_errno("signalfd", "of the lamps' guardian", errno);
+    return signals;
+}
+
+void guard(int daemon, const RequestLines& request_lines, Nanoseconds silence) {
+    Guardian guardian(request_lines, silence);
+    while (true) {
+        pollfd wait{.fd = daemon, .events = POLLIN, .revents = 0};
+        if (::poll(&wait, 1, guardian.milliseconds_left()) < 0) wait.revents = 0;
+        if (wait.revents != 0 && !guardian.hear(daemon)) return guardian.darken();
+        guardian.darken_when_overdue();
+    }
+}
+
 }  // namespace
 
-void guard_lamps(UniqueFd channel, const GpioRequest& request, const RequestLines& request_lines,
-                 Nanoseconds silence) noexcept {
+void guard_lamps(UniqueFd channel, const RequestLines& request_lines, Nanoseconds silence) noexcept {
     ::setsid();
     outlive_the_daemon();
-    Guardian(keep_only(channel), request, request_lines, silence).run();
+    for (const int number : {SIGTERM, SIGINT}) std::signal(number, SIG_IGN);
+    guard(keep_only(channel), request_lines, silence);
     ::_exit(0);
+}
+
+void serve_guardian(UniqueFd listening, const RequestLines& request_lines, Nanoseconds silence) {
+    outlive_the_daemon();
+    const UniqueFd end = request_to_end();
+    ::fcntl(listening.get(), F_SETFL, O_NONBLOCK);
+    Guardian guardian(request_lines, silence);
+    UniqueFd daemon;
+    bool asked_to_end = false;
+    while (daemon || !asked_to_end) {
+        std::array wait{pollfd{daemon.get(), POLLIN, 0}, pollfd{listening.get(), POLLIN, 0},
+                        pollfd{asked_to_end ? -1 : end.get(), POLLIN, 0}};
+        if (::poll(wait.data(), wait.size(), guardian.milliseconds_left()) < 0) wait = {};
+        if (wait[0].revents != 0 && !guardian.hear(daemon.get())) {
+            guardian.darken();
+            daemon.reset();  // which tells a daemon that waits for it that the lamps are dark
+        }
+        guardian.darken_when_overdue();
+        if (wait[1].revents != 0) {
+            UniqueFd next = next_daemon(listening, daemon);
+            if (!daemon) daemon = std::move(next);
+        }
+        if (wait[2].revents != 0) asked_to_end = true;
+    }
 }
 
 }  // namespace darkbox

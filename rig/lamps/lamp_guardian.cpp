@@ -15,6 +15,7 @@
 
 #include "acquisition/device/clock.h"
 #include "acquisition/device/device_error.h"
+#include "rig/lamps/guardian_process.h"
 
 namespace darkbox {
 namespace {
@@ -31,11 +32,21 @@ void await_end(pid_t pid) {
     }
 }
 
+/// It hangs up once the lamps are dark.
+void await_hanging_up(const UniqueFd& channel, Nanoseconds most) {
+    ::shutdown(channel.get(), SHUT_WR);
+    pollfd wait{.fd = channel.get(), .events = POLLIN, .revents = 0};
+    ::poll(&wait, 1, static_cast<int>(std::chrono::ceil<std::chrono::milliseconds>(most).count()));
+}
+
 }  // namespace
 
 LampGuardian::LampGuardian(GpioRequest request, RequestLines request_lines, GuardianOptions options)
-    : request_(std::move(request)), request_lines_(std::move(request_lines)), options_(options) {
-    if (request_.lines.size() > 64) throw std::logic_error("a guardian holds at most 64 lines");
+    : request_(std::move(request)),
+      opening_(guardian_opening(request_)),
+      request_lines_(std::move(request_lines)),
+      options_(options),
+      own_(true) {
     std::array<int, 2> ends{};
     if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0)
         throw_errno("socketpair", "of the lamps' guardian", errno);
@@ -45,19 +56,29 @@ LampGuardian::LampGuardian(GpioRequest request, RequestLines request_lines, Guar
     if (pid_ < 0) throw_errno("fork", "of the lamps' guardian", errno);
     if (pid_ == 0) {
         channel_.reset();
-        guard_lamps(std::move(theirs), request_, request_lines_, options_.silence);
+        guard_lamps(std::move(theirs), request_lines_, options_.silence);
     }
 }
+
+LampGuardian::LampGuardian(GpioRequest request, RequestLines request_lines, GuardianConnection guardian,
+                           GuardianOptions options)
+    : request_(std::move(request)),
+      opening_(guardian_opening(request_)),
+      request_lines_(std::move(request_lines)),
+      options_(options),
+      channel_(std::move(guardian.channel)),
+      pid_(guardian.process) {}
 
 LampGuardian::~LampGuardian() {
     beat_.request_stop();
     if (beat_.joinable()) beat_.join();
+    if (channel_ && !own_) await_hanging_up(channel_, options_.reply_within);
     channel_.reset();
-    await_end(pid_);
+    if (own_) await_end(pid_);
 }
 
 void LampGuardian::open() {
-    tell({.kind = GuardianCommand::Kind::open});
+    tell(std::as_bytes(std::span(&opening_, 1)), Aim::other);
     if (!beat_.joinable()) beat_ = std::jthread([this](const std::stop_token& stop) { beat(stop); });
 }
 
@@ -66,27 +87,29 @@ void LampGuardian::drive(const std::vector<std::uint64_t>& steps, Nanoseconds at
     if (steps.size() > command.step.size()) throw std::logic_error("too many steps for the lamps' guardian");
     command.steps = static_cast<std::uint32_t>(steps.size());
     std::copy(steps.begin(), steps.end(), command.step.begin());
-    tell(command);
+    tell(std::as_bytes(std::span(&command, 1)), at_most.count() == 0 ? Aim::dark : Aim::other);
 }
 
 void LampGuardian::darken(const std::vector<std::uint64_t>& steps) { drive(steps, Nanoseconds(0)); }
 
-void LampGuardian::report() { tell({.kind = GuardianCommand::Kind::report}); }
+void LampGuardian::report() {
+    const GuardianCommand command{.kind = GuardianCommand::Kind::report};
+    tell(std::as_bytes(std::span(&command, 1)), Aim::other);
+}
 
-void LampGuardian::tell(const GuardianCommand& command) {
+void LampGuardian::tell(Packet packet, Aim aim) {
     const std::scoped_lock lock(mutex_);
     if (!channel_) {
-        const bool darkens = command.kind == GuardianCommand::Kind::drive && command.at_most_ns == 0;
-        if (darkens && taken_) return;
+        if (aim == Aim::dark && taken_) return;
         take_over();
     }
-    send(command);
+    send(packet);
     const GuardianReply reply = receive();
     if (reply.failed != 0) throw DeviceError(reply.what.data(), reply.hint.data());
 }
 
-void LampGuardian::send(const GuardianCommand& command) {
-    if (::send(channel_.get(), &command, sizeof command, MSG_NOSIGNAL) != static_cast<ssize_t>(sizeof command))
+void LampGuardian::send(Packet packet) {
+    if (::send(channel_.get(), packet.data(), packet.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(packet.size()))
         take_over();
 }
 
@@ -104,7 +127,7 @@ GuardianReply LampGuardian::receive() {
         return reply;
     }
     // A reply that comes late would answer the next command: this guardian is given up.
-    ::kill(pid_, SIGKILL);
+    if (pid_ > 0) ::kill(pid_, SIGKILL);
     take_over();
 }
 

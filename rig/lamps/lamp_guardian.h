@@ -2,17 +2,19 @@
 
 #include <sys/types.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <mutex>
-#include <optional>
+#include <span>
 #include <thread>
 #include <vector>
 
 #include "acquisition/device/unique_fd.h"
 #include "acquisition/frame/units.h"
 #include "rig/lamps/gpio_lines.h"
-#include "rig/lamps/guardian_process.h"
+#include "rig/lamps/guardian_packets.h"
+#include "rig/lamps/guardian_socket.h"
 
 namespace darkbox {
 
@@ -23,16 +25,19 @@ struct GuardianOptions {
 };
 
 /// The daemon's side of the guardian: the process that holds the lamps' lines and darkens them when the daemon dies or
-/// hangs (guardian_process.h says when). The constructor forks, so it must run before any thread starts; the lines are
-/// requested by open(), as often as need be, so a chip may come later or come back.
-/// When the guardian dies, the lines are requested here, which darkens them, and nothing is lit any more.
+/// hangs (guardian.h says when). The lines are requested by open(), as often as need be, so a chip may come later or
+/// come back. When the guardian dies, the lines are requested here, which darkens them, and nothing is lit any more.
 /// Thread-safe.
 class LampGuardian {
 public:
+    /// A guardian of its own. Forks, so it must run before any thread starts.
     LampGuardian(GpioRequest request, RequestLines request_lines, GuardianOptions options = {});
+    /// The guardian that runs by itself; `request_lines` is for when it dies.
+    LampGuardian(GpioRequest request, RequestLines request_lines, GuardianConnection guardian,
+                 GuardianOptions options = {});
     LampGuardian(const LampGuardian&) = delete;
     LampGuardian& operator=(const LampGuardian&) = delete;
-    /// The lamps are dark and the guardian is gone when it returns.
+    /// The lamps are dark when it returns, and a guardian of its own is gone.
     ~LampGuardian();
 
     /// Requests every line, inactive. Throws what RequestLines throws.
@@ -47,19 +52,24 @@ public:
     pid_t process() const { return pid_; }
 
 private:
-    void tell(const GuardianCommand& command);
-    void send(const GuardianCommand& command);
+    using Packet = std::span<const std::byte>;
+    enum class Aim { dark, other };
+
+    void tell(Packet packet, Aim aim);
+    void send(Packet packet);
     GuardianReply receive();
     void beat(const std::stop_token& stop);
     [[noreturn]] void take_over();
 
     const GpioRequest request_;
+    const GuardianOpening opening_;
     const RequestLines request_lines_;
     const GuardianOptions options_;
     std::mutex mutex_;
     UniqueFd channel_;                    // guarded by mutex_
     std::unique_ptr<OutputLines> taken_;  // guarded by mutex_; held dark since the guardian died
     pid_t pid_ = -1;
+    bool own_ = false;   // a child, to be waited for
     std::jthread beat_;  // last: ends before what it uses
 };
 

@@ -4,15 +4,20 @@
 #include <algorithm>
 #include <csignal>
 #include <fstream>
+#include <functional>
 #include <optional>
 #include <sstream>
 
+#include "acquisition/device/device_error.h"
+#include "rig/lamps/guardian_socket.h"
 #include "tests/hil/daemon.h"
 #include "tests/hil/gpio_chip.h"
 #include "tests/hil/kernel_trace.h"
 #include "tests/hil/machine.h"
 #include "tests/hil/rig_text.h"
 #include "tests/hil/vivid.h"
+#include "tests/support/child_process.h"
+#include "tests/support/packet_socket.h"
 #include "tests/support/test_data.h"
 
 namespace darkbox {
@@ -68,7 +73,7 @@ protected:
 
     void light(const std::vector<std::string>& through = {}) {
         daemon.emplace(folder.path(), rig, through);
-        guardian = daemon->guardian();
+        if (!program) guardian = daemon->guardian();
         trace.emplace(std::vector<std::string>{"gpio/gpio_value", "sched/sched_process_exit"});
         daemon->start_capture("nothing", {"lamp-05"});
         ASSERT_TRUE(test::comes_true([&] { return chip->is_high(4); })) << daemon->log();
@@ -79,29 +84,38 @@ protected:
     }
     bool lives(int process) const { return fs::exists("/proc/" + std::to_string(process)); }
 
-    /// By the kernel's own account: the daemon ended, then its guardian drove the line low, then the guardian ended,
-    /// and nothing lit a line again.
-    void expect_order() {
-        ASSERT_TRUE(test::comes_true([&] { return !lives(guardian); })) << "the guardian does not end";
+    /// By the kernel's own account: the daemon ended, then its guardian drove the line low, and nothing lit a line
+    /// again. Returns how many events had passed by then.
+    int expect_darkened_after_its_death() {
         const std::vector<TraceEvent> events = trace->events();
         const std::string line = std::to_string(chip->first_number() + 4);
-        const auto place = [&](auto fits) {
-            const auto found = std::find_if(events.rbegin(), events.rend(), fits);
-            return found == events.rend() ? -1 : static_cast<int>(events.rend() - found);
-        };
         const int daemon_ends =
-            place([](const TraceEvent& e) { return e.name == "sched_process_exit" && e.task == "darkboxd"; });
-        const int lit = place([&](const TraceEvent& e) { return e.name == "gpio_value" && e.text == line + " set 1"; });
-        const int darkened = place([&](const TraceEvent& e) {
+            last_of(events, [](const TraceEvent& e) { return e.name == "sched_process_exit" && e.task == "darkboxd"; });
+        const int lit =
+            last_of(events, [&](const TraceEvent& e) { return e.name == "gpio_value" && e.text == line + " set 1"; });
+        const int darkened = last_of(events, [&](const TraceEvent& e) {
             return e.name == "gpio_value" && e.process == guardian && e.text == line + " set 0";
         });
-        const int guardian_ends =
-            place([&](const TraceEvent& e) { return e.name == "sched_process_exit" && e.process == guardian; });
         EXPECT_GT(lit, 0);
         EXPECT_LT(lit, daemon_ends);
         EXPECT_LT(daemon_ends, darkened);
-        EXPECT_LT(darkened, guardian_ends);
         EXPECT_THAT(chip->high_lines(), IsEmpty());
+        return darkened;
+    }
+
+    /// And then the guardian ended.
+    void expect_order() {
+        ASSERT_TRUE(test::comes_true([&] { return !lives(guardian); })) << "the guardian does not end";
+        const int darkened = expect_darkened_after_its_death();
+        EXPECT_LT(darkened, last_of(trace->events(), [&](const TraceEvent& e) {
+                      return e.name == "sched_process_exit" && e.process == guardian;
+                  }));
+    }
+
+    /// Its place among the events, from 1; -1: there is none.
+    static int last_of(const std::vector<TraceEvent>& events, const std::function<bool(const TraceEvent&)>& fits) {
+        const auto found = std::find_if(events.rbegin(), events.rend(), fits);
+        return found == events.rend() ? -1 : static_cast<int>(events.rend() - found);
     }
 
     test::TemporaryFolder folder;
@@ -109,6 +123,7 @@ protected:
     std::optional<test::GpioChip> chip;
     fs::path rig;
     std::optional<test::Daemon> daemon;
+    std::optional<test::ChildProcess> program;  // of the guardian, where it is not the daemon's child
     int guardian = 0;
     std::optional<test::KernelTrace> trace;
 };
@@ -128,7 +143,7 @@ TEST_F(Death, BySigkillOfItsProcessGroup) {
     expect_order();
 }
 
-/// What `systemctl kill -s KILL darkboxd` does where the guardian is in a unit of its own.
+/// Its child, moved out of the group.
 TEST_F(Death, BySigkillOfItsControlGroupWithTheGuardianInAnother) {
     const ControlGroup unit("darkboxd"), other("guardian");
     light(unit.enter());
@@ -138,8 +153,9 @@ TEST_F(Death, BySigkillOfItsControlGroupWithTheGuardianInAnother) {
     expect_order();
 }
 
-/// Where both are in one unit, nobody is left to darken anything: the kernel releases the lines, and what pulls them
-/// decides. gpio-sim pulls low, as the resistors do that docs/gpio-lamps.md asks for.
+/// Where both are in one unit, as without darkbox-guardian.socket, nobody is left to darken anything: the kernel
+/// releases the lines, and what pulls them decides. gpio-sim pulls low, as the resistors do that docs/gpio-lamps.md
+/// asks for.
 TEST_F(Death, BySigkillOfTheirCommonControlGroupLeavesTheLinesToTheirResistors) {
     const ControlGroup unit("darkboxd");
     light(unit.enter());
@@ -169,6 +185,68 @@ TEST_F(Death, ByTheOomKiller) {
     expect_order();
     EXPECT_THAT(test::text_of(unit.folder() / "memory.events"), HasSubstr("oom_kill 1"));
     EXPECT_EQ(daemon->wait(), 128 + SIGKILL);
+}
+
+/// darkboxd and darkbox-guardian as systemd has them: each in the control group of its unit, the guardian handed the
+/// socket on which darkboxd finds it.
+class DeathBesideTheGuardiansUnit : public Death {
+protected:
+    void SetUp() override {
+        Death::SetUp();
+        if (IsSkipped()) return;
+        daemon_unit.emplace("darkboxd");
+        guardian_unit.emplace("darkbox-guardian");
+        const UniqueFd listening = test::listening_for_packets(socket);
+        std::vector<std::string> command = guardian_unit->enter();
+        for (const std::string& word :
+             {std::string("/bin/sh"), std::string("-c"), std::string("LISTEN_PID=$$ LISTEN_FDS=1 exec \"$@\""),
+              std::string("sh"), test::program("darkbox-guardian")})
+            command.push_back(word);
+        program.emplace(command, folder.path() / "guardian", std::vector{listening.get()});
+        const auto runs = [] { return test::processes("darkbox-guard").size() == 1; };
+        ASSERT_TRUE(test::comes_true(runs, test::start_of_a_program)) << program->err();
+        guardian = test::processes("darkbox-guard").front();
+    }
+
+    void light_in_its_unit() {
+        std::vector<std::string> through = daemon_unit->enter();
+        through.insert(through.end(), {"/usr/bin/env", "DARKBOX_GUARDIAN=" + socket.string()});
+        light(through);
+    }
+
+    const fs::path socket = folder.path() / "guardian.sock";
+    std::optional<ControlGroup> daemon_unit, guardian_unit;
+};
+
+TEST_F(DeathBesideTheGuardiansUnit, BySigkillOfAllOfDarkboxd) {
+    light_in_its_unit();
+    daemon_unit->kill();
+    EXPECT_TRUE(is_dark());
+    expect_darkened_after_its_death();
+    EXPECT_TRUE(lives(guardian));
+    EXPECT_THAT(test::shell("gpioinfo lamps").text, HasSubstr("\"darkbox\"")) << "dark, but nobody holds it so";
+    EXPECT_EQ(test::text_of(fs::path("/proc") / std::to_string(guardian) / "oom_score_adj"), "-1000\n");
+
+    daemon.reset();
+    trace.reset();
+    fs::remove_all(folder.path() / "sessions");  // else it goes on with what was interrupted
+    light_in_its_unit();
+    daemon_unit->kill();
+    EXPECT_TRUE(is_dark());
+    expect_darkened_after_its_death();
+    EXPECT_TRUE(lives(guardian));
+}
+
+TEST_F(DeathBesideTheGuardiansUnit, AfterSigtermOfTheGuardianWhichStaysAsLongAsItIsNeeded) {
+    light_in_its_unit();
+    program->signal(SIGTERM);
+    EXPECT_THROW(connect_guardian(socket, test::start_of_a_program), DeviceError)
+        << "it has seen the signal, and serves on";
+    EXPECT_TRUE(chip->is_high(4));
+    daemon_unit->kill();
+    EXPECT_TRUE(is_dark());
+    EXPECT_EQ(program->wait(), 0) << program->err();
+    expect_order();
 }
 
 TEST_F(Death, ByHangingDarkensAndTheGuardianGoesOnHolding) {
