@@ -54,9 +54,9 @@ bool send_reply(int channel, const GuardianReply& reply) {
 }  // namespace
 
 Guardian::~Guardian() {
-    constexpr int tries = 100;
+    constexpr int last_tries = 100;
     darken();
-    for (int i = 0; owed_ && i < tries; ++i) {
+    for (int i = 0; owed_ && i < last_tries; ++i) {
         std::this_thread::sleep_for(try_again);
         repay();
     }
