@@ -132,7 +132,7 @@ Frame read_jpeg(const fs::path& file, const FrameRecord& record, RowBand band) {
         throw_damaged(file, error.what());
     }
     const auto whole = bytes_of(bytes);
-    frame.jpeg.assign(whole.begin(), whole.end());
+    if (band.first == 0 && band.count == record.height) frame.jpeg.assign(whole.begin(), whole.end());
     return frame;
 }
 

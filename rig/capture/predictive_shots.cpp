@@ -221,7 +221,10 @@ void PredictiveShots::settle_blocks(bool all) {
     while (block_ + 1 < witnesses_.size()) {
         Witness& opening = witnesses_[block_];
         Witness& closing = witnesses_[block_ + 1];
-        const bool complete = closing.after ? pending_[*closing.after].frame.has_value() : closing.frame.has_value();
+        // A probe that failed on its way left its witness without the lamp that it was to light.
+        const bool after_is_there =
+            closing.after && *closing.after < pending_.size() && pending_[*closing.after].frame.has_value();
+        const bool complete = closing.after ? after_is_there : closing.frame.has_value();
         const std::size_t first = *opening.after, last = *closing.before + 1;
         look_at_pictures(last, complete || all);
         if (!complete && !all) return;

@@ -9,11 +9,14 @@
 #include <cstring>
 #include <limits>
 #include <optional>
+#include <thread>
 
 #include "acquisition/device/device_error.h"
 
 namespace darkbox {
 namespace {
+
+constexpr auto try_again = std::chrono::milliseconds(100);
 
 using Packet = std::array<char, std::max(sizeof(GuardianCommand), sizeof(GuardianOpening))>;
 
@@ -50,6 +53,15 @@ bool send_reply(int channel, const GuardianReply& reply) {
 
 }  // namespace
 
+Guardian::~Guardian() {
+    constexpr int last_tries = 100;
+    darken();
+    for (int i = 0; owed_ && i < last_tries; ++i) {
+        std::this_thread::sleep_for(try_again);
+        repay();
+    }
+}
+
 bool Guardian::hear(int channel) {
     Packet packet;
     const ssize_t size = ::recv(channel, packet.data(), packet.size(), MSG_TRUNC | MSG_DONTWAIT);
@@ -69,13 +81,24 @@ bool Guardian::hear(int channel) {
 /// Lines that are held already are not let go of, not even for the moment that requesting them anew would take.
 void Guardian::open(const GpioRequest& request) {
     forced_.clear();
-    if (request == request_)
-        darken();
-    else
+    darken();
+    if (request != *request_) {
         lines_.reset();
-    lit_ = 0;
-    request_ = request;
-    if (!lines_) lines_ = request_lines_(request_);
+        request_ = std::make_shared<const GpioRequest>(request);
+    }
+    if (lines_) return;
+    lines_ = request_lines_(*request_);
+    if (owed_ && *owed_ == *request_) owed_.reset();
+}
+
+void Guardian::repay() noexcept {
+    if (!owed_) return;
+    try {
+        auto dark = request_lines_(*owed_);
+        if (*owed_ == *request_) lines_ = std::move(dark);
+        owed_.reset();
+    } catch (...) {  // NOLINT(bugprone-empty-catch): it stays owed
+    }
 }
 
 void Guardian::obey(const GuardianCommand& command) {
@@ -86,7 +109,7 @@ void Guardian::obey(const GuardianCommand& command) {
 
 void Guardian::need_lines() const {
     if (lines_) return;
-    throw DeviceError(fmt::format("the lines of GPIO chip \"{}\" are not open", request_.chip),
+    throw DeviceError(fmt::format("the lines of GPIO chip \"{}\" are not open", request_->chip),
                       "check the chip's cable, then darkbox lamps dark opens them again");
 }
 
@@ -107,12 +130,13 @@ void Guardian::drive(const GuardianCommand& command) {
 }
 
 void Guardian::set(std::uint64_t step) {
-    std::vector<bool> active(request_.lines.size());
-    for (std::size_t i = 0; i < active.size(); ++i) active[i] = ((step >> i) & 1U) != 0;
     try {
+        std::vector<bool> active(request_->lines.size());
+        for (std::size_t i = 0; i < active.size(); ++i) active[i] = ((step >> i) & 1U) != 0;
         lines_->set(active);
     } catch (...) {
         lines_.reset();  // opened anew, also after a replug, they start dark
+        if (lit_ != 0) owed_ = request_;
         lit_ = 0;
         throw;
     }
@@ -126,19 +150,22 @@ void Guardian::darken_or_throw() {
 void Guardian::darken() noexcept {
     try {
         if (lines_) darken_or_throw();
-    } catch (...) {  // NOLINT(bugprone-empty-catch): the chip is gone, and with it what could be done
+    } catch (...) {  // NOLINT(bugprone-empty-catch): set() has noted what is owed
     }
+    repay();
 }
 
 TimePoint Guardian::overdue_at() const { return std::min(lit_until_, heard_ + silence_); }
 
 int Guardian::milliseconds_left() const {
-    if (lit_ == 0) return -1;
+    const std::int64_t most = owed_ ? try_again.count() : std::numeric_limits<int>::max();
+    if (lit_ == 0) return owed_ ? static_cast<int>(most) : -1;
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(overdue_at() - clock_.now()).count();
-    return static_cast<int>(std::clamp<std::int64_t>(left, 0, std::numeric_limits<int>::max()));
+    return static_cast<int>(std::clamp<std::int64_t>(left, 0, most));
 }
 
 void Guardian::darken_when_overdue() {
+    repay();
     const TimePoint now = clock_.now();
     if (lit_ == 0 || now < overdue_at()) return;
     forced_ = now >= lit_until_ ? "a lamp was lit for longer than its max_on_s, and was darkened"

@@ -75,12 +75,18 @@ UniqueFd request_to_end() {
     return signals;
 }
 
+/// The kernel's word, however much of what it said is still to be heard: nothing of that is worth obeying.
+bool has_left(int daemon) {
+    pollfd look{.fd = daemon, .events = POLLRDHUP, .revents = 0};
+    return ::poll(&look, 1, 0) > 0;
+}
+
 void guard(int daemon, const RequestLines& request_lines, Nanoseconds silence) {
     Guardian guardian(request_lines, silence);
     while (true) {
         pollfd wait{.fd = daemon, .events = POLLIN, .revents = 0};
         if (::poll(&wait, 1, guardian.milliseconds_left()) < 0) wait.revents = 0;
-        if (wait.revents != 0 && !guardian.hear(daemon)) return guardian.darken();
+        if (has_left(daemon) || (wait.revents != 0 && !guardian.hear(daemon))) return;
         guardian.darken_when_overdue();
     }
 }
@@ -91,7 +97,10 @@ void guard_lamps(UniqueFd channel, const RequestLines& request_lines, Nanosecond
     ::setsid();
     outlive_the_daemon();
     for (const int number : {SIGTERM, SIGINT}) std::signal(number, SIG_IGN);
-    guard(keep_only(channel), request_lines, silence);
+    try {
+        guard(keep_only(channel), request_lines, silence);
+    } catch (...) {  // NOLINT(bugprone-empty-catch): the lamps are dark by now, and nobody is there to be told
+    }
     ::_exit(0);
 }
 
@@ -99,14 +108,14 @@ void serve_guardian(UniqueFd listening, const RequestLines& request_lines, Nanos
     outlive_the_daemon();
     const UniqueFd end = request_to_end();
     ::fcntl(listening.get(), F_SETFL, O_NONBLOCK);
-    Guardian guardian(request_lines, silence);
     UniqueFd daemon;
+    Guardian guardian(request_lines, silence);  // darkens, if need be, before the daemon is hung up on
     bool asked_to_end = false;
     while (daemon || !asked_to_end) {
         std::array wait{pollfd{daemon.get(), POLLIN, 0}, pollfd{listening.get(), POLLIN, 0},
                         pollfd{asked_to_end ? -1 : end.get(), POLLIN, 0}};
         if (::poll(wait.data(), wait.size(), guardian.milliseconds_left()) < 0) wait = {};
-        if (wait[0].revents != 0 && !guardian.hear(daemon.get())) {
+        if (daemon && (has_left(daemon.get()) || (wait[0].revents != 0 && !guardian.hear(daemon.get())))) {
             guardian.darken();
             daemon.reset();  // which tells a daemon that waits for it that the lamps are dark
         }

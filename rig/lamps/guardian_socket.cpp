@@ -5,10 +5,12 @@
 #include <sys/socket.h>
 #include <sys/un.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstdlib>
 
+#include "acquisition/device/clock.h"
 #include "acquisition/device/device_error.h"
 #include "rig/lamps/guardian_packets.h"
 
@@ -20,8 +22,7 @@ namespace fs = std::filesystem;
 constexpr const char* start_anew = "sudo systemctl restart darkbox-guardian, which restarts darkboxd as well";
 
 GuardianGreeting await_greeting(const UniqueFd& channel, const fs::path& socket, Nanoseconds within) {
-    pollfd wait{.fd = channel.get(), .events = POLLIN, .revents = 0};
-    if (::poll(&wait, 1, static_cast<int>(std::chrono::ceil<std::chrono::milliseconds>(within).count())) <= 0)
+    if (!await_packet(channel, within))
         throw DeviceError(fmt::format("the lamps' guardian at {} does not answer", socket.string()), start_anew);
     GuardianGreeting greeting;
     const ssize_t size = ::recv(channel.get(), &greeting, sizeof greeting, MSG_TRUNC);
@@ -57,6 +58,18 @@ std::optional<GuardianConnection> connect_guardian(const fs::path& socket, Nanos
     const GuardianGreeting greeting = await_greeting(channel, socket, greeting_within);
     if (greeting.process <= 0) throw DeviceError(greeting.reply.what.data(), greeting.reply.hint.data());
     return GuardianConnection{.channel = std::move(channel), .process = greeting.process};
+}
+
+bool await_packet(const UniqueFd& channel, Nanoseconds within) {
+    SystemClock clock;
+    const TimePoint deadline = clock.now() + within;
+    int ready = 0;
+    do {
+        const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - clock.now()).count();
+        pollfd wait{.fd = channel.get(), .events = POLLIN, .revents = 0};
+        ready = ::poll(&wait, 1, static_cast<int>(std::max<std::int64_t>(left, 0)));
+    } while (ready < 0 && errno == EINTR);
+    return ready > 0;
 }
 
 }  // namespace darkbox

@@ -24,4 +24,7 @@ std::filesystem::path guardian_socket();
 std::optional<GuardianConnection> connect_guardian(const std::filesystem::path& socket,
                                                    Nanoseconds greeting_within = std::chrono::seconds(5));
 
+/// Whether the other end says something, or hangs up, in this time.
+bool await_packet(const UniqueFd& channel, Nanoseconds within);
+
 }  // namespace darkbox

@@ -1,6 +1,5 @@
 #include "rig/lamps/lamp_guardian.h"
 
-#include <poll.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -13,7 +12,6 @@
 #include <csignal>
 #include <stdexcept>
 
-#include "acquisition/device/clock.h"
 #include "acquisition/device/device_error.h"
 #include "rig/lamps/guardian_process.h"
 
@@ -35,8 +33,7 @@ void await_end(pid_t pid) {
 /// It hangs up once the lamps are dark.
 void await_hanging_up(const UniqueFd& channel, Nanoseconds most) {
     ::shutdown(channel.get(), SHUT_WR);
-    pollfd wait{.fd = channel.get(), .events = POLLIN, .revents = 0};
-    ::poll(&wait, 1, static_cast<int>(std::chrono::ceil<std::chrono::milliseconds>(most).count()));
+    await_packet(channel, most);
 }
 
 }  // namespace
@@ -109,24 +106,22 @@ void LampGuardian::tell(Packet packet, Aim aim) {
 }
 
 void LampGuardian::send(Packet packet) {
-    if (::send(channel_.get(), packet.data(), packet.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(packet.size()))
-        take_over();
+    constexpr int flags = MSG_NOSIGNAL | MSG_DONTWAIT;
+    if (::send(channel_.get(), packet.data(), packet.size(), flags) == static_cast<ssize_t>(packet.size())) return;
+    if (errno == EAGAIN) give_up();  // it has not heard a beat for as long as it takes to fill the channel
+    take_over();
 }
 
 GuardianReply LampGuardian::receive() {
-    SystemClock clock;
-    const TimePoint deadline = clock.now() + options_.reply_within;
-    while (true) {
-        const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - clock.now()).count();
-        pollfd wait{.fd = channel_.get(), .events = POLLIN, .revents = 0};
-        const int ready = ::poll(&wait, 1, static_cast<int>(std::max<std::int64_t>(left, 0)));
-        if (ready < 0 && errno == EINTR) continue;
-        if (ready <= 0) break;
-        GuardianReply reply;
-        if (::recv(channel_.get(), &reply, sizeof reply, 0) != static_cast<ssize_t>(sizeof reply)) take_over();
-        return reply;
-    }
-    // A reply that comes late would answer the next command: this guardian is given up.
+    // A reply that comes late would answer the next command.
+    if (!await_packet(channel_, options_.reply_within)) give_up();
+    GuardianReply reply;
+    if (::recv(channel_.get(), &reply, sizeof reply, 0) != static_cast<ssize_t>(sizeof reply)) take_over();
+    return reply;
+}
+
+/// A guardian that hangs: alive, it would keep the lines.
+void LampGuardian::give_up() {
     if (pid_ > 0) ::kill(pid_, SIGKILL);
     take_over();
 }

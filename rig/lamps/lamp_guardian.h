@@ -59,6 +59,7 @@ private:
     void send(Packet packet);
     GuardianReply receive();
     void beat(const std::stop_token& stop);
+    [[noreturn]] void give_up();
     [[noreturn]] void take_over();
 
     const GpioRequest request_;

@@ -199,7 +199,8 @@ void PacedBoard::follow_strobe() {
 void PacedBoard::catch_up() {
     const auto wall = steady_clock::now() - wall_start_;
     const auto due = cycle_start_ + static_cast<std::uint64_t>(std::chrono::nanoseconds(wall).count()) * 16 / 1000;
-    worst_lateness_ = std::max(worst_lateness_, wall - std::chrono::nanoseconds((board_.cycle() - cycle_start_) * 1000 / 16));
+    worst_lateness_ =
+        std::max(worst_lateness_, wall - std::chrono::nanoseconds((board_.cycle() - cycle_start_) * 1000 / 16));
     if (board_.cycle() < due) {
         follow_strobe();
         const bool behind = board_.cycle() + longer_slice_us * EmulatedBoard::cycles_per_us < due;

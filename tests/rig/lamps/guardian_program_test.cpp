@@ -168,6 +168,21 @@ TEST_F(GuardianProgram, DarkensUnderAHungDaemonAndWaitsForItsEnd) {
     EXPECT_EQ(chip_.record().active, 1u);
 }
 
+TEST_F(GuardianProgram, HearsTheNextDaemonHoweverMuchADeadOneSaid) {
+    auto dead = connect_guardian(socket_);
+    guardian_->signal(SIGSTOP);
+    const GuardianCommand beat{};
+    for (int i = 0; i < 50; ++i) ::send(dead->channel.get(), &beat, sizeof beat, MSG_NOSIGNAL);
+    dead.reset();
+    const UniqueFd next(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
+    const sockaddr_un address = test::unix_address(socket_);
+    ASSERT_EQ(::connect(next.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    guardian_->signal(SIGCONT);
+    GuardianGreeting greeting;
+    ASSERT_EQ(::recv(next.get(), &greeting, sizeof greeting, 0), static_cast<ssize_t>(sizeof greeting));
+    EXPECT_EQ(greeting.process, guardian_->id()) << greeting.reply.what.data();
+}
+
 TEST_F(GuardianProgram, HangsUpOnOtherUsersOfTheMachine) {
     if (::geteuid() != 0) GTEST_SKIP() << "only root can become another user";
     fs::permissions(folder_.path(), fs::perms::all);
@@ -288,7 +303,7 @@ TEST_F(GuardianProgram, EndsBySigtermWhenNobodyNeedsIt) {
 TEST_F(GuardianProgram, ThatDiesOrHangsIsReplacedByDarkness) {
     for (const int number : {SIGKILL, SIGSTOP}) {
         if (!guardian_->running()) SetUp();
-        LampGuardian guardian = daemon({.reply_within = std::chrono::milliseconds(50)});
+        LampGuardian guardian = daemon({.reply_within = std::chrono::milliseconds(500)});
         guardian.open();
         guardian.drive({1}, a_long_time);
         guardian_->signal(number);

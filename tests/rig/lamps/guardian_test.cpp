@@ -184,7 +184,7 @@ TEST(Guardian, ThatDiesIsReplacedByDarkness) {
 
 TEST(Guardian, ThatHangsIsReplacedByDarkness) {
     test::RecordedChip chip;
-    LampGuardian guardian(nine_lines(), chip.request(), {.reply_within = std::chrono::milliseconds(50)});
+    LampGuardian guardian(nine_lines(), chip.request(), {.reply_within = std::chrono::milliseconds(500)});
     guardian.open();
     guardian.drive({1}, for_long);
     ::kill(guardian.process(), SIGSTOP);

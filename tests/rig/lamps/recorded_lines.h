@@ -27,6 +27,8 @@ struct LineRecord {
     std::atomic<std::uint32_t> holder = 0;  ///< process that requested them last
     std::atomic<int> requests = 0;
     std::atomic<bool> plugged = true;
+    std::atomic<int> failing_sets = 0;      ///< so many fail before the next works
+    std::atomic<int> failing_requests = 0;  ///< likewise
     std::atomic<std::uint32_t> sets = 0;
     std::array<std::atomic<std::uint64_t>, most_sets> set{};
 
@@ -53,11 +55,14 @@ public:
     RequestLines request() {
         return [this](const GpioRequest&) -> std::unique_ptr<OutputLines> {
             if (!record_->plugged) throw DeviceError("there is no GPIO chip with the label \"bench\"", "plug it in");
+            if (takes_one_of(record_->failing_requests)) throw_errno("request lines of GPIO chip", "\"bench\"", EIO);
             return std::make_unique<Lines>(*record_);
         };
     }
 
 private:
+    static bool takes_one_of(std::atomic<int>& failures) { return failures > 0 && failures-- > 0; }
+
     class Lines final : public OutputLines {
     public:
         explicit Lines(LineRecord& record) : record_(record) {
@@ -72,6 +77,7 @@ private:
 
         void set(const std::vector<bool>& active) override {
             if (!record_.plugged) throw_errno("set lines of GPIO chip", "\"bench\"", ENODEV);
+            if (takes_one_of(record_.failing_sets)) throw_errno("set lines of GPIO chip", "\"bench\"", EIO);
             std::uint64_t value = 0;
             for (std::size_t i = 0; i < active.size(); ++i) value |= std::uint64_t{active[i]} << i;
             record_.active = value;
