@@ -107,15 +107,12 @@ Metered meter(const CaptureRequest& request, const RigDescription& rig, const Ca
     return {found, lamps.given()};
 }
 
-/// Sets rig.camera.exposure to what the request wants; says what was found where that was metered.
-std::optional<Metered> settle_exposure(const CaptureRequest& request, RigDescription& rig,
+/// Sets rig.camera.exposure to what metering finds, where that is wanted, and says what it was.
+std::optional<Metered> meter_if_wanted(const CaptureRequest& request, RigDescription& rig,
                                        const CaptureDevices& devices, const WorkContext& work,
                                        const TimingLookup& timings) {
-    const bool metered = request.exposure ? !request.exposure->fixed : rig.capture.metered;
-    if (!metered) {
-        if (request.exposure) rig.camera.exposure = *request.exposure->fixed;
-        return std::nullopt;
-    }
+    const bool wanted = request.exposure ? !request.exposure->fixed : rig.capture.metered;
+    if (!wanted) return std::nullopt;
     Metered done = meter(request, rig, devices, work, timings);
     rig.camera.exposure = done.found.exposure;
     return done;
@@ -139,10 +136,12 @@ Begun create(const CaptureRequest& request, RigDescription& rig, const CaptureDe
     const auto card = request.flats ? std::optional(Session::open(*request.flats)) : std::nullopt;
     const auto flats = card ? std::optional(flats_for(lamps_named(rig, request.lamps), *card, rig)) : std::nullopt;
     const Seconds described = rig.camera.exposure;
-    const auto metered = settle_exposure(request, rig, devices, work, timings);
+    if (request.exposure) rig.camera.exposure = request.exposure->fixed.value_or(described);
+    // Before metering, whose light is the object's.
+    if (card) require_camera_of_flats(*card, devices.camera.configure({rig.camera.exposure, rig.camera.gain}));
+    const auto metered = meter_if_wanted(request, rig, devices, work, timings);
     CapturePlan plan = plan_capture(rig, request.lamps, request.kind);
     const CameraInfo camera = devices.camera.configure(plan.shots.front().camera);
-    if (card) require_camera_of_flats(*card, camera);
     SessionInfo info = session_info(rig, camera, request.object, plan);
     info.record = request.record;
     if (request.kind != FrameKind::lit) info.notes.push_back(kind_note + std::string(name(request.kind)));
@@ -224,9 +223,9 @@ Retake plan_of(const SessionWriter& writer, const RigDescription& rig) {
 }
 
 Begun resume(const CaptureRequest& request, RigDescription& rig) {
-    if (request.exposure || request.retake || request.flats)
+    if (request.exposure || request.retake || request.flats || request.kind != FrameKind::lit)
         throw InputError("a resumed session keeps its exposure and its plan",
-                         "leave out --exposure, --retake and --flats-from");
+                         "leave out --exposure, --plan flat, --retake and --flats-from");
     SessionWriter writer = SessionWriter::resume(request.folder);
     // A run killed before its first frame may have died before rig.toml was kept, too.
     if (writer.acknowledged().empty() && !fs::exists(writer.folder() / "data" / rig_file)) keep_rig(writer, rig);

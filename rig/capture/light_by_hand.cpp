@@ -14,17 +14,22 @@ namespace {
 constexpr double share_of_max_on = 0.9;
 constexpr const char* session_of_hand_light = "lit by hand";
 
+using Look = std::function<void()>;
+
 /// Ends early when asked to stop.
-void wait_lit(Seconds time, Clock& clock, const WorkContext& work) {
+void wait_lit(Seconds time, Clock& clock, const WorkContext& work, const Look& look) {
     constexpr auto step = std::chrono::milliseconds(20);
     const TimePoint end = clock.now() + to_nanoseconds(time);
-    while (!work.cancelled() && clock.now() < end) clock.sleep_until(std::min(end, clock.now() + step));
+    while (!work.cancelled() && clock.now() < end) {
+        clock.sleep_until(std::min(end, clock.now() + step));
+        look();
+    }
 }
 
-void burn_for(const HandLight& light, LampArray& lamps, Clock& clock, const WorkContext& work) {
-    if (work.cancelled()) return;
+void burn_for(const HandLight& light, LampArray& lamps, Clock& clock, const WorkContext& work, const Look& look) {
+    if (work.cancelled()) throw Cancelled("the lamp was not lit: cancelled before it began", "ask for it again");
     lamps.light(light.lamp, 1.0);
-    wait_lit(light.time, clock, work);
+    wait_lit(light.time, clock, work, look);
     lamps.dark();
 }
 
@@ -48,9 +53,9 @@ HandLight light_by_hand(const RigDescription& rig, const std::string& lamp, std:
 }
 
 void shine(const HandLight& light, const RigDescription& description, LampArray& lamps, Clock& clock,
-           const std::filesystem::path& sessions, const WorkContext& work) {
+           const std::filesystem::path& sessions, const WorkContext& work, const Look& look) {
     const DarkOnExit dark_on_exit(lamps);
-    if (!knows_doses(description)) return burn_for(light, lamps, clock, work);
+    if (!knows_doses(description)) return burn_for(light, lamps, clock, work, look);
     RigDescription rig = description;
     rig.dose.exempt.push_back(account_of(rig));
     const std::string object = light.object.empty() ? account_of(rig) : light.object;
@@ -58,7 +63,7 @@ void shine(const HandLight& light, const RigDescription& description, LampArray&
     const LightDose whole = over(rig.lamps.at(light.lamp.value).dose_per_s, light.time);
     require_dose(rig.dose, object, book.spent(object), {}, whole);
     DosedLamps dosed(lamps, clock, rig, book, object, session_of_hand_light);
-    burn_for(light, dosed, clock, work);
+    burn_for(light, dosed, clock, work, look);
     dosed.finish();
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 
 #include "rig/capture/capture_run.h"
@@ -23,9 +24,10 @@ HandLight light_by_hand(const RigDescription& rig, const std::string& lamp, std:
                         const std::string& object);
 
 /// Lights the lamp for its time, or until `work` is cancelled, and books the light in the folder of the sessions. The
-/// lamps are dark when it returns or throws. Throws DoseExceeded, with nothing lit, when the object's budget does not
-/// bear all of it; DeviceError.
+/// lamps are dark when it returns or throws. `look` is called every 20 ms while the lamp is lit; what it throws ends
+/// the light (see InterlockedLamps::watch()). Throws DoseExceeded, with nothing lit, when the object's budget does not
+/// bear all of it; Cancelled when that came before the light; DeviceError.
 void shine(const HandLight& light, const RigDescription& rig, LampArray& lamps, Clock& clock,
-           const std::filesystem::path& sessions, const WorkContext& work);
+           const std::filesystem::path& sessions, const WorkContext& work, const std::function<void()>& look);
 
 }  // namespace darkbox

@@ -23,7 +23,7 @@ Frame SessionRecorder::read(const FrameRecord& record) const {
 
 std::size_t SessionRecorder::bytes_of(const Entry& entry) {
     const auto* picture = std::get_if<Picture>(&entry);
-    return picture ? picture->frame.pixels.size() : 0;
+    return picture ? picture->frame.pixels.size() + picture->frame.jpeg.size() : 0;
 }
 
 void SessionRecorder::rethrow_failure() const {

@@ -15,7 +15,7 @@
 namespace darkbox {
 
 struct RecorderLimits {
-    std::size_t queued_bytes = std::size_t{256} << 20;  ///< of pixels that wait for the disk; at least one frame may
+    std::size_t queued_bytes = std::size_t{256} << 20;  ///< of frames that wait for the disk; at least one frame may
     std::chrono::milliseconds patience{10'000};         ///< how long add() waits for room before the capture fails
 };
 

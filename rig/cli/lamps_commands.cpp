@@ -9,6 +9,7 @@
 
 #include "acquisition/device/clock.h"
 #include "acquisition/device/device_error.h"
+#include "rig/capture/interlock.h"
 #include "rig/capture/light_by_hand.h"
 #include "rig/cli/rig_commands.h"
 #include "rig/daemon/client.h"
@@ -142,9 +143,15 @@ CommandResult on(const LampsArguments& a, const WorkContext& work) {
         light_by_hand(rig, a.lamp, a.seconds ? std::optional(Seconds(*a.seconds)) : std::nullopt, a.object);
     Hardware hardware(rig);
     const auto lamps = hardware.open_lamps();
+    const auto door = hardware.open_door();
+    const auto sessions = rig.sessions_folder.empty() ? default_sessions_folder() : rig.sessions_folder;
     SystemClock clock;
-    shine(light, rig, *lamps, clock, rig.sessions_folder.empty() ? default_sessions_folder() : rig.sessions_folder,
-          work);
+    if (door) {
+        InterlockedLamps guarded(*lamps, *door);
+        shine(light, rig, guarded, clock, sessions, work, [&guarded] { guarded.watch(); });
+    } else {
+        shine(light, rig, *lamps, clock, sessions, work, [] {});
+    }
     return all_dark(fmt::format("'{}' was lit; all lamps are dark", a.lamp));
 }
 

@@ -22,6 +22,13 @@ struct CaptureOutcome {
     std::vector<std::string> findings = {};  ///< what looks wrong with the rig, in words
 };
 
+/// Devices, behind the door's switch where there is one.
+struct LentDevices : CaptureDevices {
+    /// To be called at least every 50 ms while a lamp is lit and no frame is waited for: darkens the lamps and throws
+    /// DoorOpen when the door is open.
+    std::function<void()> look_at_door;
+};
+
 /// A rig with its devices open, reduced to what drives it: the daemon's capture thread, or `darkbox capture
 /// --standalone`. Its lamps are dark when it is made and when it is destroyed. Thread-compatible: one thread drives it.
 class CaptureRig {
@@ -30,7 +37,7 @@ public:
     /// The whole capture, sealed; throws what capture_session() throws. Lamps are dark afterwards.
     virtual CaptureOutcome capture(const CaptureRequest& request, const WorkContext& work) = 0;
     /// Lends the devices for a measurement; the lamps are dark afterwards. Throws what `work` throws.
-    virtual void lend(const std::function<void(const CaptureDevices&)>& work) = 0;
+    virtual void lend(const std::function<void(const LentDevices&)>& work) = 0;
     /// Throws DeviceError when darkness cannot be confirmed.
     virtual void dark() = 0;
     /// The lamps', while nothing is captured.

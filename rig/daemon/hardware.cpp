@@ -38,18 +38,18 @@ std::optional<MeasuredTiming> measured(const CameraInfo& camera) {
 }
 
 /// Lets work drive the lamps and the camera, behind the door's switch where there is one.
-void drive(const CaptureDevices& devices, Door* door, const std::function<void(const CaptureDevices&)>& work) {
-    if (door == nullptr) return work(devices);
+void drive(const CaptureDevices& devices, Door* door, const std::function<void(const LentDevices&)>& work) {
+    if (door == nullptr) return work({devices, [] {}});
     InterlockedLamps lamps(devices.lamps, *door);
     InterlockedCamera camera(devices.camera, lamps);
-    work({lamps, camera, devices.clock});
+    work({{lamps, camera, devices.clock}, [&lamps] { lamps.watch(); }});
 }
 
 CaptureOutcome capture_with(const CaptureDevices& devices, Door* door, CaptureRequest request,
                             const RigDescription& rig, Readiness& readiness, const WorkContext& work) {
     const auto start = Stopwatch::now();
     CaptureOutcome outcome;
-    drive(devices, door, [&](const CaptureDevices& d) {
+    drive(devices, door, [&](const LentDevices& d) {
         readiness.require(rig, d, request, work);
         CaptureRequest reviewed = request;
         reviewed.review = [&rig](const SessionWriter& frames) { return review_frames(frames, rig); };
@@ -85,7 +85,7 @@ public:
         return outcome;
     }
 
-    void lend(const std::function<void(const CaptureDevices&)>& work) override {
+    void lend(const std::function<void(const LentDevices&)>& work) override {
         const DarkOnExit dark_on_exit(lamps());
         drive({lamps(), sim_.camera(), sim_.clock()}, door(), work);
     }
@@ -122,16 +122,17 @@ private:
 /// Real devices; the lamps go first when it ends, so that a camera that hangs leaves them dark.
 class RealRig final : public CaptureRig {
 public:
-    RealRig(const RigDescription& rig, std::unique_ptr<LampArray> lamps)
-        : rig_(rig), camera_(device_, clock_, v4l2_options(rig.camera)), lamps_(std::move(lamps)) {
-        if (rig.door) door_ = std::make_unique<GpioDoor>(*rig.door, request_gpio_input);
-    }
+    RealRig(const RigDescription& rig, std::unique_ptr<LampArray> lamps, std::unique_ptr<Door> door)
+        : rig_(rig),
+          camera_(device_, clock_, v4l2_options(rig.camera)),
+          door_(std::move(door)),
+          lamps_(std::move(lamps)) {}
 
     CaptureOutcome capture(const CaptureRequest& request, const WorkContext& work) override {
         return capture_with({*lamps_, camera_, clock_}, door_.get(), request, rig_, readiness_, work);
     }
 
-    void lend(const std::function<void(const CaptureDevices&)>& work) override {
+    void lend(const std::function<void(const LentDevices&)>& work) override {
         const DarkOnExit dark_on_exit(*lamps_);
         drive({*lamps_, camera_, clock_}, door_.get(), work);
     }
@@ -166,10 +167,15 @@ std::unique_ptr<LampArray> Hardware::open_lamps() {
     return std::make_unique<UsbLamps>(rig_);
 }
 
+std::unique_ptr<Door> Hardware::open_door() const {
+    if (!rig_.door || rig_.camera.driver == "sim") return nullptr;
+    return std::make_unique<GpioDoor>(*rig_.door, request_gpio_input);
+}
+
 std::unique_ptr<CaptureRig> Hardware::open() {
     if (rig_.camera.driver == "sim")
         return std::make_unique<SimulatedRig>(rig_, rig_.lamps_driver == "sim" ? nullptr : open_lamps());
-    return std::make_unique<RealRig>(rig_, open_lamps());
+    return std::make_unique<RealRig>(rig_, open_lamps(), open_door());
 }
 
 CameraInfo check_camera(const RigDescription& rig) {

@@ -5,6 +5,7 @@
 
 #include "acquisition/camera/camera.h"
 #include "rig/daemon/capture_rig.h"
+#include "rig/lamps/door.h"
 #include "rig/lamps/lamp_array.h"
 #include "rig/lamps/lamp_guardian.h"
 
@@ -23,6 +24,8 @@ public:
     std::unique_ptr<CaptureRig> open();
     /// The lamps alone, dark. Throws as open(), and InputError for simulated lamps, which no one could see.
     std::unique_ptr<LampArray> open_lamps();
+    /// The switch at the door; null where there is none, or a simulated camera. Throws DeviceError.
+    std::unique_ptr<Door> open_door() const;
 
 private:
     const RigDescription rig_;

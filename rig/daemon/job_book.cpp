@@ -123,10 +123,12 @@ std::size_t JobBook::unfinished(Lane lane) const {
 std::vector<std::string> JobBook::sessions_in_use() const {
     const std::scoped_lock lock(mutex_);
     std::vector<std::string> names;
-    for (const auto& entry : live_)
-        for (const std::string& name :
-             {entry.second.job.session, entry.second.job.orders.value("resume", std::string())})
-            if (!name.empty()) names.push_back(name);
+    for (const auto& entry : live_) {
+        const Job& job = entry.second.job;
+        if (!job.session.empty()) names.push_back(job.session);
+        for (const char* key : {"resume", "retake", "flats_from"})
+            if (auto name = job.orders.value(key, std::string()); !name.empty()) names.push_back(std::move(name));
+    }
     return names;
 }
 

@@ -124,8 +124,8 @@ public:
         options.bytes_needed = [this](const CaptureOrder& order) { return capture_bytes(rig_, order); };
         options.run_processing = processing_by(darkbox_beside_this_program());
         options.retention = rig_.retention;
-        options.shine = [this, sessions](const HandLight& light, const CaptureDevices& d, const WorkContext& work) {
-            shine(light, rig_, d.lamps, d.clock, sessions, work);
+        options.shine = [this, sessions](const HandLight& light, const LentDevices& d, const WorkContext& work) {
+            shine(light, rig_, d.lamps, d.clock, sessions, work, d.look_at_door);
         };
         options.log = log;
         log_.tee([log](const std::string& event, const nlohmann::json& fields) { log(log_line_of(event, fields)); });

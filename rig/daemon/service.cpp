@@ -35,7 +35,7 @@ std::string state_hint(ServiceState state, const std::string& problem) {
         case ServiceState::idle:
             return "";
         case ServiceState::busy:
-            return "wait for the running capture, or cancel it";
+            return "wait for the running capture, or cancel it; a lamp lit by hand ends with darkbox lamps dark";
         case ServiceState::fault:
             break;
     }
@@ -180,7 +180,10 @@ Job Service::enqueue(Job job) {
     if (lane_of(job.kind) == Lane::rig) {
         if (job.kind == JobKind::recalibrate && !job.orders.contains("object") && !job.orders.contains("resume"))
             job.orders["object"] = recalibration_object;
-        (void)request_for(capture_order_from(job.orders), 1);
+        const CaptureOrder order = capture_order_from(job.orders);
+        if (job.kind == JobKind::recalibrate && order.kind == FrameKind::flat)
+            throw InputError("a recalibration needs frames of the ball, not of a card", "leave out \"plan\"");
+        (void)request_for(order, 1);
     } else if (!options_.run_processing) {
         throw Refused("this darkboxd does not process", "process with the command: darkbox process SESSION");
     } else if (job.kind == JobKind::prune) {
@@ -352,7 +355,7 @@ void Service::perform(const HandLight& light) {
         work.stop = hand_light_->get_token();
     }
     const auto failure =
-        attempt([&] { rig_->lend([&](const CaptureDevices& devices) { options_.shine(light, devices, work); }); });
+        attempt([&] { rig_->lend([&](const LentDevices& devices) { options_.shine(light, devices, work); }); });
     const auto not_dark = darken_lamps();
     look_at_lamps();
     const std::scoped_lock lock(mutex_);

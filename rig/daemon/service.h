@@ -59,7 +59,7 @@ struct ServiceOptions {
     RunProcessing run_processing = {};             ///< empty: there is none, and such jobs are refused
     std::optional<RetentionRules> retention = {};  ///< none: prune jobs are refused
     /// Lights a lamp by hand and books its light; empty: refused.
-    std::function<void(const HandLight&, const CaptureDevices&, const WorkContext&)> shine = {};
+    std::function<void(const HandLight&, const LentDevices&, const WorkContext&)> shine = {};
     LogSink log = [](const LogLine&) {};  ///< hears of frames and of what captures note
 };
 

@@ -145,8 +145,9 @@ TEST_F(FlatFramesTest, OfACardAreResumedAsSuch) {
     EXPECT_THROW(capture(asked), Cancelled);
     bench_.stop = std::stop_source();
     bench_.lamps.hook = {};
-    asked.kind = FrameKind::lit;
     asked.start = CaptureStart::resume;
+    EXPECT_THROW(capture(asked), InputError) << "what it was begun as is its own to say";
+    asked.kind = FrameKind::lit;
     const Session session = capture(asked);
     for (const FrameRecord& record : session.frames())
         EXPECT_EQ(record.kind, record.lamp ? FrameKind::flat : FrameKind::dark);
@@ -197,6 +198,17 @@ TEST_F(FlatFramesTest, AreRefusedWhereTheyDoNotBelong) {
     EXPECT_THAT(refusal(with_flats(object)), HasSubstr("none of lamp 'lamp-01'"));
     bench_.rig.name = "another";
     EXPECT_THAT(refusal(with_flats(few)), HasSubstr("captured by rig"));
+}
+
+/// Metering would light the object, for a capture that is refused.
+TEST_F(FlatFramesTest, OfAnotherCameraAreRefusedBeforeAnythingIsLit) {
+    CaptureRequest asked = with_flats(card());
+    asked.exposure = ExposureChoice{};
+    bench_.camera.id = "0002";
+    int lit = 0;
+    bench_.lamps.hook = [&](const std::string& call) { lit += call == "light" ? 1 : 0; };
+    EXPECT_THAT(refusal(asked), HasSubstr("they are of the camera"));
+    EXPECT_EQ(lit, 0);
 }
 
 /// A card bears any light; metering's counts as all light of the capture does.

@@ -1,6 +1,7 @@
 #include "rig/capture/interlock.h"
 
 #include "acquisition/device/device_error.h"
+#include "rig/capture/light_by_hand.h"
 #include "tests/rig/capture/bench.h"
 
 namespace darkbox {
@@ -80,6 +81,23 @@ TEST_F(Interlock, IsNoticedWhileTheCameraHangs) {
     EXPECT_EQ(refusal(), "the door of the box is open");
     EXPECT_LT(to_seconds(bench.clock.now() - before), 0.25);
     EXPECT_TRUE(bench.lamps.is_dark());
+}
+
+/// No frame is waited for then, and nothing else is lit.
+TEST_F(Interlock, DarkensALampLitByHandWithin50Milliseconds) {
+    TimePoint opened;
+    bench.clock.hook = [&, waits = 0](const std::string& call) mutable {
+        if (call != "sleep_until" || ++waits != 5) return;
+        door.open = true;
+        opened = bench.clock.now();
+    };
+    const HandLight light = light_by_hand(bench.rig, "lamp-02", Seconds(1), "");
+    EXPECT_THROW(shine(light, bench.rig, lamps, bench.clock, bench.folder.path(), {}, [this] { lamps.watch(); }),
+                 DoorOpen);
+    ASSERT_TRUE(door.open);
+    EXPECT_LT(bench.clock.now() - opened, std::chrono::milliseconds(50));
+    EXPECT_TRUE(bench.lamps.is_dark());
+    EXPECT_GT(bench.lamps.longest_on(), std::chrono::milliseconds(60)) << "it was lit when the door opened";
 }
 
 TEST_F(Interlock, TakesADoorThatCannotBeReadForOpen) {

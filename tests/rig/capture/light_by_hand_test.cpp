@@ -23,7 +23,7 @@ protected:
         WorkContext work;
         work.stop = bench_.stop.get_token();
         shine(light_by_hand(bench_.rig, "lamp-02", Seconds(seconds), object), bench_.rig, bench_.lamps, bench_.clock,
-              bench_.folder.path(), work);
+              bench_.folder.path(), work, look_);
     }
     double booked(const std::string& whose) const { return DoseBook(bench_.folder.path()).spent(whose).lux_s; }
     double lit_s() const {
@@ -32,6 +32,7 @@ protected:
     }
 
     Bench bench_;
+    std::function<void()> look_ = [] {};
 };
 
 TEST_F(LightByHand, CountsAsTheObjectsLight) {
@@ -73,8 +74,18 @@ TEST_F(LightByHand, EndsWhenItIsCancelledAndCountsWhatThereWas) {
     EXPECT_LT(lit_s(), 0.5);
     EXPECT_GT(lit_s(), 0.01);
     EXPECT_NEAR(booked("vase"), 1000 * lit_s(), 1);
-    shine_for(1.5, "cup");
-    EXPECT_EQ(booked("cup"), 0) << "what is cancelled before it begins lights nothing";
+    EXPECT_THROW(shine_for(1.5, "cup"), Cancelled) << "what is cancelled before it begins was not lit";
+    EXPECT_EQ(booked("cup"), 0);
+}
+
+TEST_F(LightByHand, EndsWithWhatALookThrowsAndCountsWhatThereWas) {
+    look_ = [looks = 0]() mutable {
+        if (++looks == 5) throw DoseExceeded("seen", "");
+    };
+    EXPECT_THROW(shine_for(1.5, "vase"), DoseExceeded);
+    EXPECT_TRUE(bench_.lamps.is_dark());
+    EXPECT_NEAR(lit_s(), 0.1, 0.01) << "a look every 20 ms";
+    EXPECT_NEAR(booked("vase"), 1000 * lit_s(), 1);
 }
 
 TEST_F(LightByHand, WantsALampAndATimeThatThereAre) {

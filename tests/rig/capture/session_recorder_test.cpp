@@ -66,6 +66,16 @@ TEST_F(SessionRecorderTest, TheQueueIsBounded) {
     EXPECT_EQ(writer.acknowledged().size(), 9u);
 }
 
+TEST_F(SessionRecorderTest, TheQueueCountsTheCamerasOwnBytes) {
+    Frame one = frame();
+    one.jpeg.resize(1000);
+    const std::size_t whole = one.pixels.size() + 1000;
+    SessionRecorder recorder(writer);
+    recorder.add(std::move(one), record(0));
+    recorder.finish();
+    EXPECT_EQ(recorder.most_queued(), whole);
+}
+
 TEST_F(SessionRecorderTest, AFailedWriteFailsTheCaptureAndKeepsWhatWasWritten) {
     SessionRecorder recorder(writer);
     recorder.add(frame(), record(0));

@@ -29,6 +29,27 @@ struct FakeRigScript {
     std::function<void(const CaptureRequest&, const WorkContext&)> body = [](const auto&, const auto&) {};
 };
 
+class StubLamps final : public LampArray {
+public:
+    explicit StubLamps(std::atomic<bool>& lit) : lit_(lit) {}
+    std::size_t size() const override { return 1; }
+    void light(LampId, double) override { lit_ = true; }
+    void dark() override { lit_ = false; }
+    LampHealth health() override { return {}; }
+
+private:
+    std::atomic<bool>& lit_;
+};
+
+/// Of which no frame is wanted.
+class StubCamera final : public Camera {
+public:
+    CameraInfo configure(const CameraConfig&) override { return {}; }
+    void start() override {}
+    Frame next_frame(TimePoint) override { throw DeviceError("camera: gives no frames", "ask another"); }
+    void stop() override {}
+};
+
 /// Lights its lamp while a capture runs and leaves it lit: darkness is the service's own doing.
 class FakeRig final : public CaptureRig {
 public:
@@ -47,7 +68,12 @@ public:
                 .duration = Seconds(0.5)};
     }
 
-    void lend(const std::function<void(const CaptureDevices&)>&) override {}
+    void lend(const std::function<void(const LentDevices&)>& work) override {
+        StubLamps lamps(script_.lit);
+        StubCamera camera;
+        SystemClock clock;
+        work({{lamps, camera, clock}, [] {}});
+    }
     void dark() override {
         if (script_.dark_fails) throw DeviceError("lamp board: no answer", "check its cable");
         script_.lit = false;

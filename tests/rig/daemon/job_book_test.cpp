@@ -88,6 +88,15 @@ TEST_F(JobBookTest, TheQueueSurvivesARestart) {
     EXPECT_GT(book.add(capture()).id, second);
 }
 
+TEST_F(JobBookTest, KnowsTheSessionsThatWaitingJobsNeed) {
+    JobBook& book = restart();
+    book.add(capture({{"object", "vase"}, {"flats_from", "card"}}));
+    book.add(capture({{"retake", "cup-1"}}));
+    book.add(capture({{"resume", "bowl-1"}}));
+    book.add(process("dish-1"));
+    EXPECT_THAT(book.sessions_in_use(), testing::UnorderedElementsAre("card", "cup-1", "bowl-1", "dish-1"));
+}
+
 TEST_F(JobBookTest, ACutOffCaptureGoesOnWithItsSession) {
     Job job = restart().add(capture({{"object", "vase"}, {"process", true}}));
     book_->take(Lane::rig);

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "rig/lamps/door.h"
 #include "tests/rig/daemon/fake_rig.h"
 #include "tests/support/test_data.h"
 
@@ -22,7 +23,10 @@ protected:
         ServiceOptions options;
         options.sessions = folder_.path();
         options.reopen_every = std::chrono::milliseconds(5);
-        options.shine = [](const HandLight&, const CaptureDevices&, const WorkContext&) {};
+        options.shine = [this](const HandLight& light, const LentDevices& devices, const WorkContext& work) {
+            devices.lamps.light(light.lamp, 1.0);
+            while_lit_(work);
+        };
         service_.emplace(open_fake(script_), options, log_);
         return *service_;
     }
@@ -35,6 +39,13 @@ protected:
         script_.body = run_until_cancelled;
         Service& service = start_idle();
         service.start_capture({.object = "vase"});
+        EXPECT_TRUE(eventually([this] { return script_.lit.load(); }));
+        return service;
+    }
+    Service& start_hand_light() {
+        while_lit_ = [](const WorkContext& work) { EXPECT_TRUE(eventually([&] { return work.cancelled(); })); };
+        Service& service = start_idle();
+        service.light({LampId{0}, Seconds(1), ""});
         EXPECT_TRUE(eventually([this] { return script_.lit.load(); }));
         return service;
     }
@@ -68,6 +79,7 @@ protected:
     TemporaryFolder folder_;
     FakeRigScript script_;
     EventLog log_;
+    std::function<void(const WorkContext&)> while_lit_ = [](const WorkContext&) {};
     std::optional<Service> service_;
 };
 
@@ -124,6 +136,60 @@ TEST_F(ServiceTest, LightsALampByHandOnlyWhenIdleAndIsBusyMeanwhile) {
     EXPECT_GT(all_events(log_).back().at("number").get<std::uint64_t>(), before);
     EXPECT_EQ(all_events(log_).back().at("lit"), true);
     EXPECT_EQ(end_of(service, service.start_capture({.object = "vase"}).id), JobState::done);
+}
+
+TEST_F(ServiceTest, DarkenEndsALampLitByHand) {
+    Service& service = start_hand_light();
+    try {
+        service.start_capture({.object = "vase"});
+        FAIL() << "accepted";
+    } catch (const Refused& refused) {
+        EXPECT_THAT(refused.hint(), HasSubstr("darkbox lamps dark"));
+    }
+    service.darken();
+    EXPECT_TRUE(reaches(service, ServiceState::idle));
+    EXPECT_FALSE(script_.lit);
+    EXPECT_THAT(event_types(log_), testing::Contains("light"));
+}
+
+TEST_F(ServiceTest, StoppingEndsALampLitByHand) {
+    Service& service = start_hand_light();
+    service.request_stop();
+    EXPECT_TRUE(eventually([this] { return log_.closed(); }));
+    EXPECT_FALSE(script_.lit);
+    EXPECT_FALSE(script_.open);
+    EXPECT_THAT(event_types(log_), testing::Contains("light"));
+}
+
+TEST_F(ServiceTest, TellsOfALampLitByHandWhatEndedIt) {
+    const std::vector<std::pair<std::string, std::function<void()>>> ends{
+        {"the door of the box is open", [] { throw DoorOpen("the door of the box is open", "close it"); }},
+        {"cancelled before it began", [] { throw Cancelled("cancelled before it began", "ask again"); }}};
+    Service& service = start_idle();
+    for (const auto& [what, thrown] : ends) {
+        while_lit_ = [&thrown = thrown](const WorkContext&) { thrown(); };
+        const std::uint64_t before = service.light({LampId{0}, Seconds(1), ""});
+        EXPECT_TRUE(eventually([&] { return log_.last() > before && event_types(log_).back() == "light"; }));
+        EXPECT_EQ(all_events(log_).back().at("lit"), false);
+        EXPECT_EQ(all_events(log_).back().at("detail"), what);
+        EXPECT_FALSE(script_.lit);
+        EXPECT_EQ(service.status().state, ServiceState::idle);
+    }
+}
+
+TEST_F(ServiceTest, RefusesToRecalibrateWithACard) {
+    Service& service = start_idle();
+    Job job;
+    job.kind = JobKind::recalibrate;
+    job.orders = {{"plan", "flat"}};
+    try {
+        service.enqueue(job);
+        FAIL() << "accepted";
+    } catch (const InputError& error) {
+        EXPECT_THAT(error.what(), HasSubstr("not of a card"));
+    }
+    job.orders = {{"plan", "lit"}};
+    EXPECT_NO_THROW(service.enqueue(job));
 }
 
 TEST_F(ServiceTest, OpensTheRigOnceItIsThere) {
