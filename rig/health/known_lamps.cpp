@@ -90,7 +90,8 @@ std::optional<KnownLamps> calibrated_lamps(const fs::path& sessions, const RigDe
     for (const Candidate& candidate : candidates(sessions, except)) {
         try {
             if (auto known = lamps_of(candidate, rig)) return known;
-        } catch (const Error&) {  // damaged, or being made at this moment: another one will do
+        } catch (const Error&) {
+            continue;  // damaged, or being made at this moment: another one will do
         }
     }
     return std::nullopt;

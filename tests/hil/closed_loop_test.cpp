@@ -164,11 +164,22 @@ TEST_F(ClosedLoop, CutLampIsNamed) {
     EXPECT_TRUE(chip->high_lines().empty());
 }
 
-TEST_F(ClosedLoop, SwappedLampsAreLeftToTheComparisonWithTruth) {
+TEST_F(ClosedLoop, SwappedLampsAreNamedByWhereTheyShineFrom) {
     plug_in({"--swap", "2", "5"});
     start_daemon();
-    daemon->start_capture("swapped", {"lamp-01", "lamp-02", "lamp-03", "lamp-04", "lamp-05", "lamp-06"});
-    expect_complete("swapped", 8);
+    const auto end = capture("swapped", {"lamp-01", "lamp-02", "lamp-03", "lamp-04", "lamp-05", "lamp-06"});
+    ASSERT_EQ(end.at("event"), "done") << end.dump();
+    const Session captured = daemon->session("swapped");
+    captured.verify();
+    ASSERT_EQ(captured.frames().size(), 8U);
+    for (const FrameRecord& frame : captured.frames()) {
+        const bool swapped = frame.lamp_name == "lamp-03" || frame.lamp_name == "lamp-06";
+        EXPECT_EQ(frame.verified, !swapped) << frame.file << ": " << frame.verification;
+        if (swapped) {
+            EXPECT_THAT(frame.verification, HasSubstr("lamp-03 and lamp-06 are exchanged"));
+        }
+    }
+    for (const SessionEvent& event : captured.events()) std::cout << "  told: " << event.what << '\n';
     daemon->hand_out("swapped");
 }
 
