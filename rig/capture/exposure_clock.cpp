@@ -83,6 +83,10 @@ Nanoseconds ExposureClock::margin() const {
     return rounded(few * worst_off_ + least_margin_ns) + (measured_ ? measured_->margin : Nanoseconds(0));
 }
 
+Nanoseconds ExposureClock::doubt() const {
+    return locked() || places_.size() < wanted_places ? Nanoseconds(0) : std::min(margin(), rounded(nominal_period_));
+}
+
 Interval ExposureClock::exposure_of(const Frame& frame) const {
     if (!measured_) return frame.exposure;
     return {frame.timestamp + measured_->begin_from_stamp, frame.timestamp + measured_->end_from_stamp};

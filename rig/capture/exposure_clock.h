@@ -34,6 +34,9 @@ public:
     /// it delivers when it can, or slower than it says.
     bool locked() const { return places_.size() >= wanted_places && 2 * worst_off_ < nominal_period_; }
     Nanoseconds period() const { return Nanoseconds(static_cast<Nanoseconds::rep>(period_)); }
+    /// Of a camera that has no rhythm although enough frames came: how far its stamps may be off, at most a period;
+    /// else nothing.
+    Nanoseconds doubt() const;
     /// How far an exposure may lie from where it is predicted.
     Nanoseconds margin() const;
 

@@ -193,7 +193,7 @@ Frame FrameSource::first_after(TimePoint earliest, TimePoint deadline) {
         Frame frame = passed_over == 0 ? next(deadline) : next_of_several(deadline, passed_over);
         const Place before = take_in(frame);
         lost_ += lost_while_waiting(frame, before, begin);
-        const Nanoseconds margin = rhythm_.locked() ? rhythm_.margin() : Nanoseconds(0);
+        const Nanoseconds margin = rhythm_.locked() ? rhythm_.margin() : rhythm_.doubt();
         if (frame.exposure.begin >= earliest + margin) check_order(frame, before);
         if (in_rhythm_ && frame.exposure.begin >= earliest + margin && !has_old_controls(frame)) {
             check_present(frame);

@@ -90,13 +90,18 @@ TEST(ExposureClock, ACameraThatKeepsNoRhythmHasNone) {
             late.exposure = {at, at + milliseconds(20)};
             EXPECT_TRUE(clock.follow(late)) << "a stamp is believed as long as nothing speaks against it";
             EXPECT_FALSE(clock.locked()) << n;
+            if (n < 5) {
+                EXPECT_EQ(clock.doubt(), Nanoseconds(0)) << "nothing is known yet";
+            }
         }
+        EXPECT_EQ(clock.doubt(), Nanoseconds(33'333'333)) << "one frame more, never longer";
         for (std::uint64_t n = 60; n < 100; ++n) {
             Frame again = frame(n);
             again.timestamp = at + real_period * static_cast<std::int64_t>(n - 59);
             clock.follow(again);
         }
         EXPECT_TRUE(clock.locked()) << "it keeps its rate again";
+        EXPECT_EQ(clock.doubt(), Nanoseconds(0));
     }
 }
 
