@@ -4,69 +4,36 @@
 
 #include <array>
 #include <cmath>
-#include <csetjmp>
 #include <cstdint>
-#include <cstdio>
 #include <cstring>
 #include <string>
 
 #include "acquisition/frame/error.h"
-
-// jpeglib.h needs <cstdio> before it.
-#include <jpeglib.h>
+#include "acquisition/frame/jpeg_decoder.h"
 
 namespace darkbox {
 namespace {
 
-/// libjpeg leaves its functions by longjmp: what calls them here holds nothing that needs a destructor.
-struct MotionDecoder {
-    MotionDecoder() {
-        jpeg.err = ::jpeg_std_error(&errors);
-        jpeg.client_data = this;
-        errors.error_exit = leave;
-        errors.emit_message = [](j_common_ptr common, int level) {
-            if (level < 0) leave(common);  // a warning: libjpeg would make up what is missing
-        };
-        errors.output_message = [](j_common_ptr) {};
-    }
-    MotionDecoder(const MotionDecoder&) = delete;
-    MotionDecoder& operator=(const MotionDecoder&) = delete;
-    ~MotionDecoder() { ::jpeg_destroy_decompress(&jpeg); }
+/// Any warning: libjpeg would make up what is missing.
+void leave_on_warning(j_common_ptr common, int level) {
+    if (level < 0) JpegDecoder::leave(common);
+}
 
-    [[noreturn]] static void leave(j_common_ptr common) {
-        auto& self = *static_cast<MotionDecoder*>(common->client_data);
-        common->err->format_message(common, self.error);
-        std::longjmp(self.way_out, 1);
-    }
+bool read_header(JpegDecoder& decoder, std::span<const std::byte> bytes) {
+    if (setjmp(decoder.way_out) != 0) return false;
+    ::jpeg_create_decompress(&decoder.decompress);
+    ::jpeg_mem_src(&decoder.decompress, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
+    ::jpeg_read_header(&decoder.decompress, TRUE);
+    decoder.decompress.out_color_space = JCS_RGB;
+    decoder.decompress.dct_method = JDCT_ISLOW;
+    return true;
+}
 
-    bool read_header(std::span<const std::byte> bytes) {
-        if (setjmp(way_out) != 0) return false;
-        ::jpeg_create_decompress(&jpeg);
-        ::jpeg_mem_src(&jpeg, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
-        ::jpeg_read_header(&jpeg, TRUE);
-        return true;
-    }
-    bool start() {
-        if (setjmp(way_out) != 0) return false;
-        jpeg.out_color_space = JCS_RGB;
-        jpeg.dct_method = JDCT_ISLOW;
-        return ::jpeg_start_decompress(&jpeg) == TRUE;
-    }
-    bool read_row(JSAMPROW row) {
-        if (setjmp(way_out) != 0) return false;
-        return ::jpeg_read_scanlines(&jpeg, &row, 1) == 1;
-    }
-    /// Also looks at what follows the last row: it must be a picture's end.
-    bool finish() {
-        if (setjmp(way_out) != 0) return false;
-        return ::jpeg_finish_decompress(&jpeg) == TRUE;
-    }
-
-    jpeg_decompress_struct jpeg{};
-    jpeg_error_mgr errors{};
-    std::jmp_buf way_out{};
-    char error[JMSG_LENGTH_MAX] = "";
-};
+/// Also looks at what follows the last row: it must be a picture's end.
+bool finish(JpegDecoder& decoder) {
+    if (setjmp(decoder.way_out) != 0) return false;
+    return ::jpeg_finish_decompress(&decoder.decompress) == TRUE;
+}
 
 /// IEC 61966-2-1.
 std::array<std::uint16_t, 256> light_of_codes() {
@@ -87,9 +54,9 @@ std::array<std::uint16_t, 256> light_of_codes() {
 
 std::vector<std::byte> decode_motion_jpeg(std::span<const std::byte> jpeg, int width, int height, int first, int rows) {
     static const std::array<std::uint16_t, 256> light = light_of_codes();
-    MotionDecoder decoder;
-    if (!decoder.read_header(jpeg)) refuse_jpeg(std::string("is damaged: ") + decoder.error);
-    const auto& header = decoder.jpeg;
+    JpegDecoder decoder(leave_on_warning);
+    if (!read_header(decoder, jpeg)) refuse_jpeg(std::string("is damaged: ") + decoder.error);
+    const auto& header = decoder.decompress;
     if (static_cast<int>(header.image_width) != width || static_cast<int>(header.image_height) != height)
         refuse_jpeg(fmt::format("has {} x {} pixels instead of {} x {}", header.image_width, header.image_height, width,
                                 height));
@@ -104,7 +71,7 @@ std::vector<std::byte> decode_motion_jpeg(std::span<const std::byte> jpeg, int w
         for (std::size_t i = 0; i < samples; ++i) words[i] = light[row[i]];
         std::memcpy(result.data() + 2 * samples * static_cast<std::size_t>(y - first), words.data(), 2 * samples);
     }
-    if (good && first + rows == height) good = decoder.finish();
+    if (good && first + rows == height) good = finish(decoder);
     if (!good) refuse_jpeg(std::string("is damaged or cut short: ") + decoder.error);
     return result;
 }

@@ -1,14 +1,12 @@
-#include <csetjmp>
 #include <cstdio>
 #include <string>
 #include <vector>
 
+#include "acquisition/frame/jpeg_decoder.h"
 #include "processing/formats/picture_header.h"
 #include "processing/formats/row_decoders.h"
 
-// jpeglib.h needs <cstdio> before it; jerror.h needs jpeglib.h.
-#include <jpeglib.h>
-//
+// jerror.h needs jpeglib.h.
 #include <jerror.h>
 
 namespace darkbox {
@@ -16,56 +14,24 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// libjpeg leaves its functions by longjmp here: those that call them hold nothing that needs a destructor.
-struct JpegDecoder {
-    JpegDecoder() {
-        decompress.err = ::jpeg_std_error(&errors);
-        decompress.client_data = this;
-        errors.error_exit = leave;
-        errors.emit_message = watch;
-        errors.output_message = [](j_common_ptr) {};
-    }
-    JpegDecoder(const JpegDecoder&) = delete;
-    JpegDecoder& operator=(const JpegDecoder&) = delete;
-    ~JpegDecoder() { ::jpeg_destroy_decompress(&decompress); }
+/// libjpeg makes up the rest of a picture that ends early and only warns.
+void leave_when_cut_short(j_common_ptr common, int level) {
+    const int code = common->err->msg_code;
+    if (level < 0 && (code == JWRN_JPEG_EOF || code == JWRN_HIT_MARKER || code == JWRN_HUFF_BAD_CODE))
+        JpegDecoder::leave(common);
+}
 
-    [[noreturn]] static void leave(j_common_ptr common) {
-        auto& self = *static_cast<JpegDecoder*>(common->client_data);
-        common->err->format_message(common, self.error);
-        std::longjmp(self.way_out, 1);
-    }
-    /// libjpeg makes up the rest of a picture that ends early and only warns.
-    static void watch(j_common_ptr common, int level) {
-        const int code = common->err->msg_code;
-        if (level < 0 && (code == JWRN_JPEG_EOF || code == JWRN_HIT_MARKER || code == JWRN_HUFF_BAD_CODE))
-            leave(common);
-    }
+bool is_cmyk(const JpegDecoder& decoder) {
+    return decoder.decompress.jpeg_color_space == JCS_CMYK || decoder.decompress.jpeg_color_space == JCS_YCCK;
+}
 
-    bool is_cmyk() const { return decompress.jpeg_color_space == JCS_CMYK || decompress.jpeg_color_space == JCS_YCCK; }
-
-    jpeg_decompress_struct decompress{};
-    jpeg_error_mgr errors{};
-    std::jmp_buf way_out{};
-    char error[JMSG_LENGTH_MAX] = "";
-};
-
-bool start(JpegDecoder& decoder, std::FILE* file) {
+bool read_header(JpegDecoder& decoder, std::FILE* file) {
     if (setjmp(decoder.way_out) != 0) return false;
     ::jpeg_create_decompress(&decoder.decompress);
     ::jpeg_stdio_src(&decoder.decompress, file);
     ::jpeg_read_header(&decoder.decompress, TRUE);
-    decoder.decompress.out_color_space = decoder.is_cmyk() ? JCS_CMYK : JCS_RGB;
+    decoder.decompress.out_color_space = is_cmyk(decoder) ? JCS_CMYK : JCS_RGB;
     return true;
-}
-
-bool start_decoding(JpegDecoder& decoder) {
-    if (setjmp(decoder.way_out) != 0) return false;
-    return ::jpeg_start_decompress(&decoder.decompress) == TRUE;
-}
-
-bool read_row(JpegDecoder& decoder, JSAMPROW row) {
-    if (setjmp(decoder.way_out) != 0) return false;
-    return ::jpeg_read_scanlines(&decoder.decompress, &row, 1) == 1;
 }
 
 /// What is printed reflects what its ink and its black let through. Adobe's files hold that, others the ink itself.
@@ -86,17 +52,17 @@ public:
           decoder_(std::move(decoder)) {}
 
     void read(cv::Mat& rows) override {
-        if (!started_) started_ = start_decoding(*decoder_);
+        if (!started_) started_ = decoder_->start();
         bool good = started_;
         for (int y = 0; good && y < rows.rows; ++y)
-            good = decoder_->is_cmyk() ? read_cmyk(rows.ptr(y)) : read_row(*decoder_, rows.ptr(y));
+            good = is_cmyk(*decoder_) ? read_cmyk(rows.ptr(y)) : decoder_->read_row(rows.ptr(y));
         if (!good) throw bad_picture(file_, std::string("is damaged or cut short: ") + decoder_->error);
     }
 
 private:
     bool read_cmyk(uchar* rgb) {
         cmyk_.resize(4 * static_cast<std::size_t>(size().width));
-        if (!read_row(*decoder_, cmyk_.data())) return false;
+        if (!decoder_->read_row(cmyk_.data())) return false;
         rgb_from_cmyk(cmyk_, decoder_->decompress.saw_Adobe_marker != 0, rgb);
         return true;
     }
@@ -113,8 +79,8 @@ private:
 std::unique_ptr<PictureRows> open_jpeg_rows(const fs::path& path) {
     const std::string file = path.string();
     FileHandle handle = open_for_reading(path);
-    auto decoder = std::make_unique<JpegDecoder>();
-    if (!start(*decoder, handle.get()))
+    auto decoder = std::make_unique<JpegDecoder>(leave_when_cut_short);
+    if (!read_header(*decoder, handle.get()))
         throw bad_picture(file, std::string("is damaged or cut short: ") + decoder->error);
     require_sane_size(decoder->decompress.image_width, decoder->decompress.image_height, file);
     return std::make_unique<JpegRows>(file, std::move(handle), std::move(decoder));

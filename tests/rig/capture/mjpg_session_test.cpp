@@ -14,6 +14,7 @@
 #include "rig/capture/capture_session.h"
 #include "tests/acquisition/camera/fake_video_device.h"
 #include "tests/acquisition/session/test_frames.h"
+#include "tests/rig/capture/two_lamps.h"
 #include "tests/support/jpeg_stream.h"
 #include "tests/support/test_data.h"
 
@@ -23,16 +24,6 @@ namespace {
 using testing::HasSubstr;
 
 constexpr int columns = 320, rows = 240;
-
-class TwoLights final : public LampArray {
-public:
-    std::size_t size() const override { return 2; }
-    void light(LampId lamp, double) override { lit = lamp; }
-    void dark() override { lit.reset(); }
-    LampHealth health() override { return {}; }
-
-    std::optional<LampId> lit;
-};
 
 /// Shares of full scale: each lamp lights its own side more.
 double light_at(LampId lamp, int x) {
@@ -85,7 +76,7 @@ protected:
     test::Random random{7};
     std::map<std::uint64_t, std::vector<std::byte>> given;  ///< by the driver's count
     std::function<void(test::FakeFrame&)> fault;
-    TwoLights lamps;
+    test::TwoLamps lamps;
 };
 
 std::vector<std::byte> bytes_in(const std::filesystem::path& file) {

@@ -8,6 +8,7 @@
 #include "rig/capture/capture_session.h"
 #include "tests/acquisition/camera/fake_video_device.h"
 #include "tests/acquisition/session/test_frames.h"
+#include "tests/rig/capture/two_lamps.h"
 #include "tests/support/test_data.h"
 
 namespace darkbox {
@@ -17,16 +18,6 @@ using std::chrono::milliseconds;
 using test::FakeFrame;
 
 constexpr int width = 32, height = 24;
-
-class TwoLamps final : public LampArray {
-public:
-    std::size_t size() const override { return 2; }
-    void light(LampId lamp, double) override { lit = lamp; }
-    void dark() override { lit.reset(); }
-    LampHealth health() override { return {}; }
-
-    std::optional<LampId> lit;
-};
 
 /// A whole capture through the V4L2 driver, with the kernel's answers scripted: what the sensor sees is the lamp that
 /// is lit when a frame ends, with noise.
@@ -90,7 +81,7 @@ position_mm = [300, 0, 900]
     test::FakeVideoDevice kernel{time};
     test::Random random{7};
     std::function<void(FakeFrame&)> fault;
-    TwoLamps lamps;
+    test::TwoLamps lamps;
     RigDescription rig;
 };
 
