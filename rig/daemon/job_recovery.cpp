@@ -35,19 +35,20 @@ Job finished(Job job, const fs::path& folder) {
     return job;
 }
 
-/// The orders that go on where the capture was, its other words (such as what is to follow) kept.
+/// The orders that go on where the capture was. What it was begun with its session knows by itself; how to take its
+/// lamps and what is to follow it does not.
 Job resumed(Job job, const fs::path& sessions) {
     if (job.session.empty()) return job;
     std::error_code ignored;
-    const bool began = fs::exists(sessions / job.session / journal_name, ignored);
-    job.orders.erase("resume");
-    job.orders.erase("name");
-    if (began) {
-        for (const char* key : {"object", "inventory", "dublin_core", "lamps"}) job.orders.erase(key);
-        job.orders["resume"] = job.session;
-    } else {
+    if (!fs::exists(sessions / job.session / journal_name, ignored)) {
+        job.orders.erase("resume");
         job.orders["name"] = job.session;
+        return job;
     }
+    nlohmann::json orders = {{"resume", job.session}};
+    for (const char* key : {"mode", "process"})
+        if (job.orders.contains(key)) orders[key] = job.orders[key];
+    job.orders = std::move(orders);
     return job;
 }
 

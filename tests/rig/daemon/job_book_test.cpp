@@ -111,6 +111,24 @@ TEST_F(JobBookTest, ACutOffCaptureGoesOnWithItsSession) {
     EXPECT_EQ(resumed->attempts, 2);
 }
 
+TEST_F(JobBookTest, ACutOffCaptureGoesOnWithoutTheOrdersThatItsSessionKnows) {
+    const json orders = {{"object", "vase"},  {"inventory", "V 1"},   {"dublin_core", {{"title", "A vase"}}},
+                         {"name", "vase-1"},  {"exposure", "auto"},   {"lamps", {"lamp-01"}},
+                         {"mode", "settled"}, {"flats_from", "card"}, {"process", true}};
+    restart().add(capture(orders));
+    restart().add(capture({{"retake", "vase-1"}, {"lamps", {"lamp-01"}}}));
+    restart().add(capture({{"plan", "flat"}}));
+    for (const char* name : {"vase-1", "vase-2", "card-2"}) {
+        const auto job = book_->take(Lane::rig);
+        book_->set_session(job->id, name);
+        const SessionWriter left = begin(name);
+    }
+    restart();
+    EXPECT_EQ(book_->take(Lane::rig)->orders, json({{"resume", "vase-1"}, {"mode", "settled"}, {"process", true}}));
+    EXPECT_EQ(book_->take(Lane::rig)->orders, json({{"resume", "vase-2"}}));
+    EXPECT_EQ(book_->take(Lane::rig)->orders, json({{"resume", "card-2"}}));
+}
+
 TEST_F(JobBookTest, ACutOffCaptureThatHadNotBegunKeepsItsName) {
     const Job job = restart().add(capture({{"object", "vase"}}));
     book_->take(Lane::rig);

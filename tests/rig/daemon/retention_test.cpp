@@ -186,6 +186,21 @@ TEST_F(RetentionTest, WhatAnotherRefersToStays) {
     EXPECT_THAT(removed(prune({.keep_days = 7})), ElementsAre("first"));
 }
 
+TEST_F(RetentionTest, WhatAnInterruptedCaptureTakesFramesOverFromStays) {
+    capture("card", 1);
+    capture("other", 1);
+    SessionInfo info;
+    info.created = "2026-01-30T12:00:00.000Z";
+    info.source = "capture";
+    info.planned_shots = 2;
+    info.flats = SessionReference{"card", std::string(64, '0')};
+    {
+        const SessionWriter interrupted = SessionWriter::create(at("vase"), info);
+    }
+    EXPECT_THAT(removed(prune({.keep_days = 7})), ElementsAre("other"));
+    EXPECT_THAT(left(), ElementsAre("card", "vase"));
+}
+
 TEST_F(RetentionTest, FirstAndLastCalibrationOfARigStay) {
     for (int day = 1; day <= 4; ++day) {
         capture(numbered("ball-", day), day);
