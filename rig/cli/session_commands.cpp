@@ -15,44 +15,49 @@ namespace fs = std::filesystem;
 
 /// What became of the session that another one refers to; it is looked for in the same folder.
 struct Referred {
-    std::size_t frames = 0;  ///< taken over, from it or from those before it
     bool found = false;
     bool unchanged = false;
 };
 
 Referred look_up(const Session& session, const SessionReference& old) {
-    Referred referred;
-    for (const FrameRecord& frame : session.frames()) referred.frames += !frame.taken_over_from.empty();
     const fs::path plain = session.folder().has_filename() ? session.folder() : session.folder().parent_path();
     const fs::path there = fs::absolute(plain).parent_path() / old.name;
-    if (!is_sealed(there)) return referred;
-    referred.found = true;
-    referred.unchanged = Session::open(there).reference() == old;
-    return referred;
+    if (!is_sealed(there)) return {};
+    return {.found = true, .unchanged = Session::open(there).reference() == old};
+}
+
+/// Says under `key` and in words what `frames` of the session were taken over from, and warns where that is another by
+/// now.
+void add_origin(CommandResult& result, const Session& session, const char* key, const SessionReference& old,
+                const std::string& frames) {
+    const Referred referred = look_up(session, old);
+    result.json[key] = {{"session", old.name}, {"found", referred.found}, {"unchanged", referred.unchanged}};
+    result.text += fmt::format("; {} taken over from {}, which {}", frames, old.name,
+                               !referred.found       ? "is not beside it"
+                               : !referred.unchanged ? "is beside it, but holds something else by now"
+                                                     : "is beside it as it was");
+    if (referred.found && !referred.unchanged)
+        result.warnings.push_back(
+            fmt::format("{} is not the session that {} refers to", old.name, session.folder().string()));
 }
 
 CommandResult verify(const fs::path& folder) {
     const Session session = Session::open(folder);
     session.verify();
     CommandResult result;
-    std::size_t unverified = 0;
-    for (const FrameRecord& frame : session.frames())
+    std::size_t unverified = 0, taken_over = 0, flats = 0;
+    for (const FrameRecord& frame : session.frames()) {
         unverified += session.info().source == "capture" && !frame.verified;
+        if (frame.taken_over_from.empty()) continue;
+        ++(frame.file.starts_with("frames/flat/") ? flats : taken_over);
+    }
     if (unverified > 0)
         result.warnings.push_back(fmt::format("{} frames were not verified to be lit by their lamp", unverified));
     result.json = {{"session", folder.string()}, {"frames", session.frames().size()}, {"complete", true}};
     result.text = fmt::format("{}: {} frames, every checksum fits", folder.string(), session.frames().size());
-    if (const auto& old = session.info().retakes) {
-        const Referred referred = look_up(session, *old);
-        result.json["retakes"] = {{"session", old->name}, {"found", referred.found}, {"unchanged", referred.unchanged}};
-        result.text += fmt::format("; {} of them taken over from {}, which {}", referred.frames, old->name,
-                                   !referred.found       ? "is not beside it"
-                                   : !referred.unchanged ? "is beside it, but holds something else by now"
-                                                         : "is beside it as it was");
-        if (referred.found && !referred.unchanged)
-            result.warnings.push_back(
-                fmt::format("{} is not the session that {} refers to", old->name, folder.string()));
-    }
+    const SessionInfo& info = session.info();
+    if (info.retakes) add_origin(result, session, "retakes", *info.retakes, fmt::format("{} of them", taken_over));
+    if (info.flats) add_origin(result, session, "flats", *info.flats, fmt::format("{} of a card", flats));
     return result;
 }
 

@@ -101,6 +101,9 @@ TEST_F(CaptureCommand, TakesTheFlatFramesOfACardAlong) {
     EXPECT_NEAR(dim / other, 0.7, 0.02);
     const auto again = capture({"--rig", rig_, "--retake", vase_, "--lamps", "lamp-01", "--out", again_});
     EXPECT_EQ(again.status, 0) << again.err;
+    EXPECT_THAT(darkbox_program({"verify", again_}).out,
+                HasSubstr("7 of them taken over from vase, which is beside it as it was; "
+                          "8 of a card taken over from card, which is beside it as it was"));
     EXPECT_THAT(capture({"--rig", rig_, "--plan", "flat", "--flats-from", card}).err, HasSubstr("at once"));
     EXPECT_THAT(darkbox_program({"process", card}).err, HasSubstr("--flats-from"));
 }
