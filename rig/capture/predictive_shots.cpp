@@ -20,6 +20,8 @@ constexpr Nanoseconds longest_guard = std::chrono::milliseconds(3);
 /// What a call to the lamps is expected to take at most; one that takes longer costs a frame.
 constexpr std::uint64_t spare_frames = 16;
 constexpr Nanoseconds switching_time = std::chrono::microseconds(50);
+/// Switches in mid-exposure that are tried for one witness.
+constexpr int most_probes = 3;
 
 double ms(Nanoseconds d) { return to_seconds(d) * 1000.0; }
 
@@ -142,21 +144,42 @@ std::optional<double> PredictiveShots::probe_share() const {
     return (1 + telling * (most.late - most.early)) / 2;
 }
 
-/// Switches in the middle of an exposure.
+/// Switches in the middle of an exposure. A switch that comes so late that its frame could not tell anything is taken
+/// back and tried again: a block of frames hangs on it.
 void PredictiveShots::probe(std::optional<std::size_t> before, std::optional<std::size_t> after) {
     const ExposureClock& rhythm = source_.rhythm();
-    Witness witness;
+    Witness& witness = witnesses_.emplace_back();
     witness.before = before;
     witness.after = after;
-    witness.sequence = std::max(rhythm.first_from(clock_.now() + longest_guard), before ? last_frame_ + 1 : 0);
-    const TimePoint moment = rhythm.predicted(witness.sequence).begin +
+    const std::uint64_t first = before ? last_frame_ + 1 : 0;
+    for (int attempt = 1;; ++attempt) {
+        const TimePoint from =
+            std::max(clock_.now() + longest_guard, lamps_.timeline().steady_from() + rhythm.margin());
+        witness.sequence = std::max(rhythm.first_from(from), first);
+        switch_within(witness.sequence, after);
+        if (attempt == most_probes ||
+            can_tell(expected_in(witness), source_.info().height, after.has_value(), tolerance()))
+            return;
+        take_back(before, after);
+    }
+}
+
+void PredictiveShots::switch_within(std::uint64_t sequence, std::optional<std::size_t> after) {
+    const TimePoint moment = source_.rhythm().predicted(sequence).begin +
                              to_nanoseconds(*source_.info().readout / 2 +
                                             (1 - probe_share().value_or(0.5)) * source_.info().controls.exposure);
-    witnesses_.push_back(std::move(witness));
     if (after) return light(*after, moment);
     pump_until(moment);
     pending_.back().off = clock_.now();
     lamps_.dark();
+}
+
+void PredictiveShots::take_back(std::optional<std::size_t> before, std::optional<std::size_t> after) {
+    if (after) pending_.pop_back();
+    if (before)
+        lamps_.light(*shots_[*before].lamp);
+    else
+        lamps_.dark();
 }
 
 void PredictiveShots::pump_until(TimePoint moment) {
@@ -302,6 +325,20 @@ void PredictiveShots::hand_on(std::size_t shot) {
     pending.frame.reset();
 }
 
+/// By the switches as they really were.
+ExpectedShares PredictiveShots::expected_in(const Witness& witness) const {
+    const Seconds exposure = source_.info().controls.exposure;
+    const Interval span = source_.rhythm().predicted(witness.sequence);
+    return [this, span, exposure, before = witness.before, after = witness.after](double height) {
+        const TimePoint begin = span.begin + to_nanoseconds(height * *source_.info().readout);
+        const Interval row{begin, begin + to_nanoseconds(exposure)};
+        const auto share = [&](std::optional<std::size_t> shot) {
+            return shot ? lamps_.timeline().share(*shots_[*shot].lamp, row) : 0.0;
+        };
+        return LightShares{share(before), share(after)};
+    };
+}
+
 /// Why the witness does not bear out the timestamps; empty when it does.
 std::string PredictiveShots::heard(const Witness& witness) const {
     const std::string who = fmt::format("frame {}, during which the lamps were switched,", witness.sequence);
@@ -311,22 +348,13 @@ std::string PredictiveShots::heard(const Witness& witness) const {
         if (!pending_[*witness.after].frame) return who + " has no frame after it to compare with";
         after = &*pending_[*witness.after].frame;
     }
-    const Seconds exposure = source_.info().controls.exposure;
-    const Interval span = source_.rhythm().predicted(witness.sequence);
-    const auto expected = [&](double height) {
-        const TimePoint begin = span.begin + to_nanoseconds(height * *source_.info().readout);
-        const Interval row{begin, begin + to_nanoseconds(exposure)};
-        const auto share = [&](std::optional<std::size_t> shot) {
-            return shot ? lamps_.timeline().share(*shots_[*shot].lamp, row) : 0.0;
-        };
-        return LightShares{share(witness.before), share(witness.after)};
-    };
     const std::optional<std::string> before = witness.before ? std::optional(name_of(*witness.before)) : std::nullopt;
-    const auto report = check_.hear(before, *witness.frame, after, expected, tolerance());
+    const auto report = check_.hear(before, *witness.frame, after, expected_in(witness), tolerance());
     if (!report || !report->informative) return who + " shows too little of both lights to tell when it was exposed";
     if (report->agrees) return "";
-    return fmt::format("{} was exposed {:.2f} ms from where its timestamp says", who,
-                       1000.0 * exposure.count() * std::max(report->latest, report->earliest));
+    return fmt::format(
+        "{} was exposed {:.2f} ms from where its timestamp says", who,
+        ms(to_nanoseconds(source_.info().controls.exposure)) * std::max(report->latest, report->earliest));
 }
 
 }  // namespace darkbox

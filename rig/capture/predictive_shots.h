@@ -53,6 +53,8 @@ private:
     void run();
     void light(std::size_t shot, TimePoint moment);
     void probe(std::optional<std::size_t> before, std::optional<std::size_t> after);
+    void switch_within(std::uint64_t sequence, std::optional<std::size_t> after);
+    void take_back(std::optional<std::size_t> before, std::optional<std::size_t> after);
     TimePoint gap_after(std::uint64_t sequence) const;
     void pump_until(TimePoint moment);
     void file(Frame frame);
@@ -63,6 +65,7 @@ private:
     void look_at_pictures(std::size_t last, bool all);
     std::string verify(std::size_t first, std::size_t last, Witness& opening, Witness& closing);
     void hand_on(std::size_t shot);
+    ExpectedShares expected_in(const Witness& witness) const;
     std::string heard(const Witness& witness) const;
     struct Repeat {
         std::uint64_t sequence = 0;

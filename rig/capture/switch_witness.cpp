@@ -122,7 +122,26 @@ BandExpectation expect(const ExpectedShares& expected, int first, int last, int 
                              blur_of(top.after, middle.after, bottom.after))};
 }
 
+WitnessTolerance allowed_in(const BandExpectation& claimed, const WitnessTolerance& tolerance) {
+    return {tolerance.late + claimed.blur, tolerance.early + claimed.blur};
+}
+
+/// A part of an exposure is expected, large and small enough for lies of just over the tolerance to show.
+bool is_telling(const BandExpectation& claimed, bool lit_after, const WitnessTolerance& tolerance) {
+    const WitnessTolerance allowed = allowed_in(claimed, tolerance);
+    const double part = lit_after ? claimed.shares.after : 1 - claimed.shares.before;
+    return claimed.blur <= tolerance.early && part >= telling * allowed.late && part <= 1 - telling * allowed.early;
+}
+
 }  // namespace
+
+bool can_tell(const ExpectedShares& expected, int rows, bool lit_after, const WitnessTolerance& tolerance) {
+    const int bands = std::min(most_bands, rows);
+    for (int band = 0; band < bands; ++band)
+        if (is_telling(expect(expected, rows * band / bands, rows * (band + 1) / bands, rows), lit_after, tolerance))
+            return true;
+    return false;
+}
 
 WitnessReport hear_witness(const WitnessPictures& pictures, const NoiseModel& noise, double full_scale,
                            const ExpectedShares& expected, const WitnessTolerance& tolerance) {
@@ -135,16 +154,14 @@ WitnessReport hear_witness(const WitnessPictures& pictures, const NoiseModel& no
         const double most_sigma = blur * std::min(tolerance.late, tolerance.early);
         if (!seen.solved || std::max(seen.before_sigma, seen.after_sigma) > most_sigma) continue;
         const BandExpectation claimed = expect(expected, first, last, rows);
-        const WitnessTolerance allowed{tolerance.late + claimed.blur, tolerance.early + claimed.blur};
+        const WitnessTolerance allowed = allowed_in(claimed, tolerance);
         for (const double late : {pictures.before ? seen.before - claimed.shares.before : 0.0,
                                   pictures.after ? claimed.shares.after - seen.after : 0.0}) {
             report.latest = std::max(report.latest, late);
             report.earliest = std::max(report.earliest, -late);
             report.agrees = report.agrees && late <= allowed.late && -late <= allowed.early;
         }
-        const double part = pictures.after ? claimed.shares.after : 1 - claimed.shares.before;
-        report.informative = report.informative || (claimed.blur <= tolerance.early && part >= telling * allowed.late &&
-                                                    part <= 1 - telling * allowed.early);
+        report.informative = report.informative || is_telling(claimed, pictures.after != nullptr, tolerance);
     }
     return report;
 }

@@ -40,6 +40,10 @@ struct WitnessReport {
     double earliest = 0.0;  ///< and the other
 };
 
+/// Whether a frame of which this is expected can be a witness, its noise aside: some band of its rows shows such a part
+/// of an exposure. `lit_after`: there is a lamp of after.
+bool can_tell(const ExpectedShares& expected, int rows, bool lit_after, const WitnessTolerance& tolerance);
+
 WitnessReport hear_witness(const WitnessPictures& pictures, const NoiseModel& noise, double full_scale,
                            const ExpectedShares& expected, const WitnessTolerance& tolerance);
 

@@ -64,6 +64,7 @@ void StudyLamps::set(std::optional<LampId> lamp, TimePoint when) {
 }
 
 void StudyLamps::light(LampId lamp, double) {
+    if (std::ranges::find(case_.stalled, lightings_++) != case_.stalled.end()) clock_.pass(ns(case_.stall));
     if (catch_up) catch_up();
     next_step_ = program_.size();
     clock_.pass(ns(random_.uniform(2e-6, 20e-6)));

@@ -54,6 +54,8 @@ struct StudyCase {
     int lie_frames = 0;      ///< late_buffers: how old
     double settle = 0.0005;  ///< what rig.toml says; the lamps come up and fade within it
     std::size_t lamps = 64;
+    std::vector<int> stalled = {};  ///< calls that light a lamp, counted from 0, before which the host does other work
+    double stall = 0;               ///< for so long
     std::uint64_t seed = 1;
 };
 
@@ -111,6 +113,7 @@ private:
     std::vector<StrobeStep> program_;
     std::size_t next_step_ = 0;
     std::vector<StrobeEvent> events_;
+    int lightings_ = 0;
 };
 
 /// What is true of a delivered frame.

@@ -54,6 +54,20 @@ TEST(PredictiveMode, TakesAFrameALamp) {
     EXPECT_GE(tally.speed.at(0), 0.95);
 }
 
+/// A busy host may switch so late that the frame to be spoiled was exposed by then.
+TEST(PredictiveMode, TriesAWitnessAgainThatCameTooLate) {
+    StudyCase c;
+    c.exposure = 0.6 * c.period;
+    c.latency = 3;
+    c.stalled = {0};  // the first switch of all is a witness
+    c.stall = 0.7 * c.period;
+    const StudyTally tally = study_session(c, SyncMode::predictive);
+    EXPECT_EQ(tally.lights, c.lamps);
+    EXPECT_EQ(tally.wrong + tally.foreign, 0);
+    EXPECT_EQ(tally.rejected, 0);
+    EXPECT_GE(tally.speed.at(0), 0.9);
+}
+
 TEST(PredictiveMode, SaysSoWhenTheGapIsTooShort) {
     StudyCase c;
     c.exposure = 0.9 * c.period;
