@@ -92,7 +92,7 @@ TEST_F(DaemonProcess, NamesLampsThatAreExchanged) {
     ASSERT_EQ(findings.size(), 1U);
     EXPECT_THAT(findings[0].get<std::string>(), HasSubstr("lamp-02 and lamp-05 are exchanged"));
     EXPECT_EQ(client_.call("GET", "jobs/1").at("findings"), findings);
-    EXPECT_EQ(Session::open(sessions_ / "cat").events().back().what, findings[0]);
+    EXPECT_EQ(Session::open(sessions_ / "cat").events().back().what, findings[0].get<std::string>());
 }
 
 TEST_F(DaemonProcess, LightsALampByHandAndBooksItsLight) {
