@@ -12,9 +12,12 @@ if(CCACHE)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
 endif()
 
-# Headers take more of a compiler's time than what most sources say themselves.
+# Headers take more of a compiler's time than what most sources say themselves. darkbox_unity(darkbox_sim ALONE ...): but
+# for these, such as kernels that compile themselves once per instruction set.
 function(darkbox_unity target)
+  cmake_parse_arguments(U "" "" "ALONE" ${ARGN})
   set_target_properties(${target} PROPERTIES UNITY_BUILD ${DARKBOX_UNITY} UNITY_BUILD_BATCH_SIZE 8)
+  set_source_files_properties(${U_ALONE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
 
 function(darkbox_module name)

@@ -28,5 +28,6 @@ struct Interval {
 
 constexpr Nanoseconds to_nanoseconds(Seconds s) { return std::chrono::duration_cast<Nanoseconds>(s); }
 constexpr double to_seconds(Nanoseconds d) { return Seconds(d).count(); }
+constexpr double to_milliseconds(Nanoseconds d) { return to_seconds(d) * 1000.0; }
 
 }  // namespace darkbox

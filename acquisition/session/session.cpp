@@ -20,7 +20,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t largest_document = std::size_t{64} << 20;
-constexpr const char* damaged_hint = "the session is damaged or was not written by darkbox; take it from a backup";
 
 /// What to do about a session that was never sealed.
 std::string resume_hint(const fs::path& folder) {

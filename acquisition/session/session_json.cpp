@@ -18,7 +18,6 @@ namespace {
 using Json = nlohmann::ordered_json;  // fields keep the order in which people read them
 
 constexpr int deepest_nesting = 16;
-constexpr const char* damaged_hint = "the session is damaged or was not written by darkbox; take it from a backup";
 
 [[noreturn]] void refuse(const std::string& where, const std::string& what) {
     throw InputError(where + ": " + what, damaged_hint);

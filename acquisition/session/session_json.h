@@ -7,6 +7,10 @@
 
 namespace darkbox {
 
+/// What to do about a session that is not as darkbox left it.
+inline constexpr const char* damaged_hint =
+    "the session is damaged or was not written by darkbox; take it from a backup";
+
 /// The text forms of a session: the lines of its journal (each without its newline) and session.json. The readers
 /// throw one InputError that begins with `where` for whatever is wrong: syntax, nesting, types, ranges, names.
 

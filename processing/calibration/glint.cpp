@@ -7,21 +7,21 @@
 namespace darkbox {
 namespace {
 
-constexpr double max_share_of_zone = 0.04;
-constexpr double max_small_area_px = 12;  ///< a spot of this size is compact in a ball of any size
+constexpr double max_glint_share = 0.04;
+constexpr double small_glint_px = 12;  ///< a spot of this size is compact in a ball of any size
 constexpr double least_contrast = 3;
 constexpr double least_radiance = 0.02;
 constexpr double least_movement = 0.02;  ///< in radii
 
-struct Spot {
+struct Glint {
     double value = 0;
     cv::Point at;
 };
 
-std::optional<Spot> find_glint(const cv::Mat1f& image, const Circle& circle) {
+std::optional<Glint> find_glint(const cv::Mat1f& image, const Circle& circle) {
     const double reach = mirror_zone * circle.radius;
     std::vector<float> values;
-    Spot spot;
+    Glint spot;
     const int top = std::max(0, static_cast<int>(std::ceil(circle.y - reach)));
     const int bottom = std::min(image.rows - 1, static_cast<int>(std::floor(circle.y + reach)));
     for (int y = top; y <= bottom; ++y) {
@@ -40,7 +40,7 @@ std::optional<Spot> find_glint(const cv::Mat1f& image, const Circle& circle) {
     if (!(spot.value > least_contrast * background + least_radiance)) return std::nullopt;
     const double half_height = (spot.value + background) / 2;
     const auto area = std::count_if(values.begin(), values.end(), [&](float v) { return v > half_height; });
-    const double limit = std::max(max_small_area_px, max_share_of_zone * static_cast<double>(values.size()));
+    const double limit = std::max(small_glint_px, max_glint_share * static_cast<double>(values.size()));
     if (static_cast<double>(area) > limit) return std::nullopt;
     return spot;
 }

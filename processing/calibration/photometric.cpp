@@ -13,7 +13,7 @@ namespace {
 constexpr double samples_wanted = 6000;
 constexpr double fewest_pixels = 150;
 constexpr double least_of_brightest = 0.1;  ///< darker samples may be in shadow
-constexpr double rejected_sigmas = 3;
+constexpr double rejected_sample_sigmas = 3;
 constexpr double least_sigma = 1e-4;  ///< of a pixel's brightest sample
 constexpr int rounds = 30;
 constexpr int trim_every = 5;
@@ -57,10 +57,11 @@ void leave_out_strays(LambertSamples& samples, const Eigen::MatrixXd& usable, co
     const Eigen::MatrixXd expected = factors.surface * factors.lamps.transpose();
     for (Eigen::Index p = 0; p < usable.rows(); ++p) {
         for (Eigen::Index f = 0; f < usable.cols(); ++f)
-            samples.kept(p, f) = usable(p, f) > 0 && expected(p, f) > 0 &&
-                                         std::abs(samples.radiance(p, f) - expected(p, f)) < rejected_sigmas * sigma
-                                     ? 1
-                                     : 0;
+            samples.kept(p, f) =
+                usable(p, f) > 0 && expected(p, f) > 0 &&
+                        std::abs(samples.radiance(p, f) - expected(p, f)) < rejected_sample_sigmas * sigma
+                    ? 1
+                    : 0;
         if (samples.kept.row(p).sum() < fewest_kept) samples.kept.row(p).setZero();
     }
 }

@@ -21,7 +21,7 @@ constexpr double farthest_mm = 100'000;
 constexpr double triad_elevation_deg = 35.2644;  // of an orthogonal triad around the view axis: atan(1 / sqrt 2)
 constexpr double naive_elevation_deg = 45;
 
-constexpr int normals_sampled = 1000;
+constexpr int normals_planned_for = 1000;
 constexpr std::array<double, 8> steps_deg{16, 8, 4, 2, 1, 0.5, 0.25, 0.125};
 constexpr int sweeps_per_step = 12;
 constexpr double least_gain = 1e-9;  // relative; what a move must bring
@@ -95,7 +95,7 @@ class Criterion {
 public:
     Criterion(const Places& places, PlanShadows shadows)
         : shadows_(shadows),
-          normals_(visible_normals(normals_sampled)),
+          normals_(visible_normals(normals_planned_for)),
           information_(normals_.size(), Eigen::Matrix3d::Zero()) {
         for (const Place& place : places) add(place.direction(), 1);
         value_ = mean(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());

@@ -13,7 +13,7 @@ constexpr double floor_share = 0.1;        ///< of a spot's height: radiance tha
 constexpr double steady_sigma_px = 0.002;  ///< what is left without noise: simulated
 constexpr double blind_px = 0.29;          ///< standard deviation of a place known to one pixel
 constexpr double blind_spread_px2 = 0.1;   ///< second moment by which a spot tells more of its place: simulated
-constexpr int most_rounds = 20;
+constexpr int most_fit_rounds = 20;
 constexpr double blur_px2 = 0.4;          ///< second moment that pixels and optics add to a spot
 constexpr double bloom_px = 0.7;          ///< by which a saturated spot outgrows the lamp's image
 constexpr double border_sigma = 0.15;     ///< px; of a saturated spot of radius 1, less for larger ones: simulated
@@ -55,7 +55,7 @@ struct Windowed {
 Windowed windowed_centroid(const SpotPatch& patch, const Centroid& start, double window2) {
     const double overshoot = 1 + start.spread / window2;  // by which the window holds the place back, Gaussian spots
     Windowed w{start.at, 0, start.spread};
-    for (int round = 0; round < most_rounds; ++round) {
+    for (int round = 0; round < most_fit_rounds; ++round) {
         double sum = 0, moment = 0, even = 0, grainy = 0;
         cv::Point2d pull(0, 0);
         for (std::size_t i = 0; i < patch.at.size(); ++i) {

@@ -19,7 +19,7 @@ constexpr double pairs_wanted = 12000;  ///< over the whole picture, most of the
 constexpr std::size_t most_pixels_of_law = 1000;
 constexpr std::size_t classes = 8;
 constexpr std::size_t least_lights_of_law = 7;
-constexpr double deviation_per_median = 1.4826;
+constexpr double sigma_per_median = 1.4826;
 
 /// Two pixels side by side, before any noise is known.
 struct Pair {
@@ -142,8 +142,7 @@ NoiseModel noise_of_differences(const std::vector<Pair>& pairs, const LightField
         std::nth_element(first, first + (last - first) / 2, last, [](const Difference& a, const Difference& b) {
             return a.squared != b.squared ? a.squared < b.squared : a.radiance < b.radiance;
         });
-        points.push_back(
-            {radiance, deviation_per_median * deviation_per_median * (first + (last - first) / 2)->squared});
+        points.push_back({radiance, sigma_per_median * sigma_per_median * (first + (last - first) / 2)->squared});
     }
     return line_through(points);
 }

@@ -19,11 +19,11 @@ namespace {
 
 constexpr std::size_t fewest_samples = 4;     ///< of a pixel: three determine g, the rest say something of intensities
 constexpr std::size_t most_values = 600'000;  ///< pixels times lights
-constexpr double dark_share = 1e-3;           ///< of the median photograph
-constexpr double least_gap = 4;               ///< of the second eigenvalue over the first
-constexpr double least_second = 1e-6;         ///< of the second eigenvalue, relative to their mean
-constexpr double largest_step = 20;           ///< an intensity's change in one round
-constexpr double least_determinant = 1e-3;    ///< of the directions of a pixel's kept samples, per sample
+constexpr double least_share_of_median = 1e-3;  ///< of a photograph that is not dark
+constexpr double least_gap = 4;                 ///< of the second eigenvalue over the first
+constexpr double least_second = 1e-6;           ///< of the second eigenvalue, relative to their mean
+constexpr double largest_step = 20;             ///< an intensity's change in one round
+constexpr double least_determinant = 1e-3;      ///< of the directions of a pixel's kept samples, per sample
 
 /// One channel's samples, a column for each pixel; NaN where clipped or not a number.
 using Samples = Eigen::MatrixXd;
@@ -110,7 +110,7 @@ void require_light_in_all(const Samples& samples, const UsedLights& used, const 
     std::sort(sorted.begin(), sorted.end());
     const double median = sorted[sorted.size() / 2];
     for (std::size_t j = 0; j < means.size(); ++j)
-        if (!(means[j] > dark_share * median))
+        if (!(means[j] > least_share_of_median * median))
             throw InputError(
                 fmt::format("{} is dark, so its lamp's intensity cannot be estimated", lights[used.image[j]].file),
                 "leave that frame out with --drop, or give intensities");

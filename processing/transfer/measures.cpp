@@ -10,6 +10,7 @@
 #include "processing/maps/parallel.h"
 #include "processing/maps/require.h"
 #include "processing/transfer/expected_look.h"
+#include "processing/transfer/option_checks.h"
 #include "processing/transfer/patch_energy.h"
 
 namespace darkbox {
@@ -155,22 +156,14 @@ TransferMeasures measured(const Appearance& source, const Appearance& target, co
     return m;
 }
 
-template <class Number>
-void require_range(const char* field, Number value, Number low, Number high) {
-    if (value >= low && value <= high) return;
-    throw InputError(fmt::format("measures: {} is {}, but it must be {}...{}", field, value, low, high),
-                     fmt::format("set {} within its range", field));
-}
-
 }  // namespace
 
 void MeasureOptions::validate() const {
-    require_range("window", window, 3, 15);
-    if (window % 2 == 0)
-        throw InputError(fmt::format("measures: window is {}, but it must be odd", window),
-                         "set window to an odd number of pixels, such as 5");
-    require_range("stride", stride, 1, 64);
-    require_range("low_pass", low_pass, 1.0, 64.0);
+    const OptionChecks checks{"measures"};
+    checks.require_range("window", window, 3, 15);
+    checks.require_odd("window", window);
+    checks.require_range("stride", stride, 1, 64);
+    checks.require_range("low_pass", low_pass, 1.0, 64.0);
 }
 
 std::optional<double> histogram_distance(const Appearance& source, const Appearance& target) {

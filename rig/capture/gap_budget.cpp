@@ -5,17 +5,12 @@
 #include <algorithm>
 
 namespace darkbox {
-namespace {
-
-double ms(Nanoseconds d) { return to_seconds(d) * 1000.0; }
-
-}  // namespace
-
 std::string GapBudget::words() const {
     return fmt::format(
         "of {:.2f} ms between frames exposure and read-out take {:.2f}, the lamps' settling {:.2f}, a "
         "switch {:.2f} and jitter {:.2f} on either side",
-        ms(period), ms(exposed), ms(settle), ms(switching), ms(margin));
+        to_milliseconds(period), to_milliseconds(exposed), to_milliseconds(settle), to_milliseconds(switching),
+        to_milliseconds(margin));
 }
 
 GapBudget gap_budget(const ExposureClock& rhythm, const RigDescription& rig, std::span<const Shot> shots) {

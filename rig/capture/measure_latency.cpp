@@ -20,7 +20,7 @@ constexpr double least_share = 0.08;
 constexpr double spreads = 3.0;
 constexpr double most_sigma = 0.05;
 constexpr std::size_t fewest_readings = 8;
-constexpr int spare_frames = 4;
+constexpr int frames_to_be_sure = 4;
 
 /// One row of one frame.
 struct Reading {
@@ -60,7 +60,8 @@ private:
     /// Whatever the camera held back is gone after this.
     Frame much_later() {
         const CameraInfo& info = source_.info();
-        const TimePoint earliest = clock_.now() + period() * (info.queue_depth + info.latency_frames + spare_frames);
+        const TimePoint earliest =
+            clock_.now() + period() * (info.queue_depth + info.latency_frames + frames_to_be_sure);
         return source_.first_after(earliest, earliest + 16 * period() + to_nanoseconds(rig_.capture.frame_deadline));
     }
 
@@ -91,7 +92,7 @@ private:
         lamps_.light(options_.lamp);
         const TimePoint on = before + (clock_.now() - before) / 2;
         const CameraInfo& info = source_.info();
-        const TimePoint until = on + period() * (info.queue_depth + spare_frames + 4);
+        const TimePoint until = on + period() * (info.queue_depth + frames_to_be_sure + 4);
         while (auto frame = source_.next_until(until)) {
             if (!source_.in_rhythm()) continue;
             read(*frame, on);

@@ -23,8 +23,6 @@ constexpr Nanoseconds switching_time = std::chrono::microseconds(50);
 /// Switches in mid-exposure that are tried for one witness.
 constexpr int most_probes = 3;
 
-double ms(Nanoseconds d) { return to_seconds(d) * 1000.0; }
-
 }  // namespace
 
 Unproven PredictiveShots::take(std::span<const Shot> shots, const ShotSink& proven) {
@@ -318,7 +316,7 @@ std::string PredictiveShots::verify(std::size_t first, std::size_t last, Witness
 
 void PredictiveShots::hand_on(std::size_t shot) {
     Pending& pending = pending_[shot];
-    const double after = ms(pending.frame->exposure.begin - pending.on);
+    const double after = to_milliseconds(pending.frame->exposure.begin - pending.on);
     (*proven_)(shots_[shot],
                {std::move(*pending.frame), pending.on, pending.off,
                 fmt::format("exposed {:.1f} ms after the switch, which fell into the gap; {}", after, pending.found)});
@@ -354,7 +352,7 @@ std::string PredictiveShots::heard(const Witness& witness) const {
     if (report->agrees) return "";
     return fmt::format(
         "{} was exposed {:.2f} ms from where its timestamp says", who,
-        ms(to_nanoseconds(source_.info().controls.exposure)) * std::max(report->latest, report->earliest));
+        to_milliseconds(to_nanoseconds(source_.info().controls.exposure)) * std::max(report->latest, report->earliest));
 }
 
 }  // namespace darkbox

@@ -9,9 +9,7 @@ namespace {
 
 /// Of a program: its first lamp may be exposed twice, and darkness ends it.
 constexpr std::size_t most_shots = StrobedLamps::longest_program - 2;
-constexpr int spare_frames = 16;
-
-double ms(Nanoseconds d) { return to_seconds(d) * 1000.0; }
+constexpr int frames_beyond_program = 16;
 
 }  // namespace
 
@@ -54,7 +52,7 @@ StrobedShots::Stepped StrobedShots::step_through(const std::vector<StrobeStep>& 
     Stepped stepped;
     StrobedLamps& strobed = *lamps_.array().strobed();
     const ExposureClock& rhythm = source_.rhythm();
-    const auto frames = static_cast<int>(program.size()) + source_.info().queue_depth + spare_frames;
+    const auto frames = static_cast<int>(program.size()) + source_.info().queue_depth + frames_beyond_program;
     const TimePoint deadline = clock_.now() + frames * rhythm.period() + to_nanoseconds(rig_.capture.frame_deadline);
     // In the middle of what is left of the gap: the exposure is over, and there is time to settle before the next.
     strobed.arm(program, budget.exposed + (budget.period - budget.exposed - budget.settle) / 2);
@@ -114,7 +112,7 @@ void StrobedShots::take_program(std::span<const Shot> shots, const GapBudget& bu
             if (learns && frames.size() < 2) continue;
             const std::string words =
                 check_.accept_lit(rig_.lamps.at(shots[i].lamp->value).name, *frames[0], learns ? frames[1] : nullptr);
-            const double after = ms(frames[0]->exposure.begin - on);
+            const double after = to_milliseconds(frames[0]->exposure.begin - on);
             taken[i] = {std::move(*frames[0]), on, off,
                         fmt::format("exposed {:.1f} ms after the strobe's step; {}", after, words)};
             found[i] = 1;

@@ -18,8 +18,6 @@ struct LatencyArguments {
     std::filesystem::path state;
 };
 
-double ms(Nanoseconds d) { return to_seconds(d) * 1000.0; }
-
 LampId lamp_named(const RigDescription& rig, const std::string& name) {
     if (name.empty()) return LampId{0};
     for (std::uint32_t id = 0; id < rig.lamps.size(); ++id)
@@ -32,9 +30,9 @@ std::string sentence(const LatencyReport& r) {
         "{} exposes its first row from {:+.3f} ms beside the timestamp on (the driver says {:+.3f}), its last row "
         "until "
         "{:+.3f} ms; read-out {:.3f} ms, exposure {:.3f} ms (set to {:.3f}); sure to {:.3f} ms, from {} readings",
-        r.camera.model, ms(r.timing.begin_from_stamp), 1000 * r.told_begin.count(), ms(r.timing.end_from_stamp),
-        ms(r.timing.readout), 1000 * r.exposure.count(), 1000 * r.camera.controls.exposure.count(), ms(r.timing.margin),
-        r.readings);
+        r.camera.model, to_milliseconds(r.timing.begin_from_stamp), 1000 * r.told_begin.count(),
+        to_milliseconds(r.timing.end_from_stamp), to_milliseconds(r.timing.readout), 1000 * r.exposure.count(),
+        1000 * r.camera.controls.exposure.count(), to_milliseconds(r.timing.margin), r.readings);
 }
 
 CommandResult run(const LatencyArguments& a, const WorkContext& work) {
@@ -54,12 +52,12 @@ CommandResult run(const LatencyArguments& a, const WorkContext& work) {
     CommandResult result;
     result.json = {{"camera", report.camera.model},
                    {"driver", report.camera.driver},
-                   {"begin_from_stamp_ms", ms(report.timing.begin_from_stamp)},
-                   {"end_from_stamp_ms", ms(report.timing.end_from_stamp)},
+                   {"begin_from_stamp_ms", to_milliseconds(report.timing.begin_from_stamp)},
+                   {"end_from_stamp_ms", to_milliseconds(report.timing.end_from_stamp)},
                    {"told_begin_from_stamp_ms", 1000 * report.told_begin.count()},
-                   {"readout_ms", ms(report.timing.readout)},
+                   {"readout_ms", to_milliseconds(report.timing.readout)},
                    {"exposure_ms", 1000 * report.exposure.count()},
-                   {"margin_ms", ms(report.timing.margin)},
+                   {"margin_ms", to_milliseconds(report.timing.margin)},
                    {"readings", report.readings},
                    {"file", file.string()}};
     result.text = sentence(report) + "\nkept in " + file.string() + " for captures with this camera, mode and exposure";

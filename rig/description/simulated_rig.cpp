@@ -2,15 +2,16 @@
 
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "acquisition/frame/error.h"
+#include "rig/description/lamp_section.h"
 #include "rig/description/rig_description.h"
 
 namespace darkbox {
 namespace {
 
 constexpr int fewest_lamps = 3;  ///< a normal has three unknowns
-constexpr int most_lamps = 64;
 constexpr double dome_radius_mm = 1000;
 constexpr double lowest_deg = 35;
 constexpr double highest_deg = 75;
@@ -59,7 +60,7 @@ driver = "sim"
 }  // namespace
 
 std::string simulated_rig_toml(int lamps) {
-    if (lamps < fewest_lamps || lamps > most_lamps)
+    if (lamps < fewest_lamps || std::cmp_greater(lamps, most_lamps))
         throw InputError(fmt::format("a simulated rig of {} lamps; allowed: {} to {}", lamps, fewest_lamps, most_lamps),
                          "normals need at least three lights");
     std::string toml = fmt::format(fmt::runtime(head), lamps);

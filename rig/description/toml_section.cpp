@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t longest_quoted_key = 40;
 
 /// Keys come from outside: an endless one must not fill the message.
-std::string quoted(const std::string& key) {
+std::string in_quotes(const std::string& key) {
     return "'" + (key.size() <= longest_quoted_key ? key : key.substr(0, longest_quoted_key) + "...") + "'";
 }
 
@@ -62,8 +62,8 @@ void TomlSection::allow(const std::set<std::string>& keys, const std::string& ki
     }
     if (first == nullptr) return;
     const std::string near = nearest_word(first_key, known_);
-    throw InputError(fmt::format("{}: unknown {} {} in {}{}", place(first->source()), kind, quoted(first_key), title_,
-                                 near.empty() ? "" : fmt::format("; did you mean '{}'?", near)),
+    throw InputError(fmt::format("{}: unknown {} {} in {}{}", place(first->source()), kind, in_quotes(first_key),
+                                 title_, near.empty() ? "" : fmt::format("; did you mean '{}'?", near)),
                      known_.empty() ? fmt::format("{} has no keys; remove it", title_)
                                     : fmt::format("{} knows: {}", title_, fmt::join(known_, ", ")));
 }
@@ -132,7 +132,7 @@ std::string TomlSection::choice(const std::string& key, const std::string& fallb
     const std::string value = text(key).value_or(fallback);
     if (std::find(choices.begin(), choices.end(), value) == choices.end()) {
         const std::string allowed = fmt::format("\"{}\"", fmt::join(choices, "\", \""));
-        fail(key, fmt::format("{} is {}; allowed: {}", key, quoted(value), allowed),
+        fail(key, fmt::format("{} is {}; allowed: {}", key, in_quotes(value), allowed),
              fmt::format("choose one of {}", allowed));
     }
     return value;

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double spot_share = 0.1;  ///< of the ball's radius: a spot lies within this around its middle
 constexpr double least_spot_px = 3;
-constexpr double sure = 5;  ///< standard deviations
+constexpr double sure_of_light = 5;  ///< standard deviations
 
 double spot_radius(const Ball& ball) { return std::max(least_spot_px, spot_share * ball.radius); }
 
@@ -84,7 +84,7 @@ std::vector<Leak> find_leaks(const std::vector<BallLook>& shining, const BallLoo
             if (commanded && spots[*commanded] && cv::norm(spots[*commanded]->at - spots[j]->at) < 3 * radius) continue;
             const SpotLight light = light_at(look.light, spots[j]->at, radius);
             const double full = spots[j]->strength * look.exposure_s;
-            if (light.sum > sure * light.sigma && light.sum > least_share * full)
+            if (light.sum > sure_of_light * light.sigma && light.sum > least_share * full)
                 leaks.push_back({commanded, j, light.sum / full, light.sigma / full});
         }
     };

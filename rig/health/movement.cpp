@@ -7,9 +7,9 @@
 namespace darkbox {
 namespace {
 
-constexpr double around_ball = 1.2;  ///< of its radius: what is not the object
-constexpr double within_ball = 1.4;  ///< its outline is what tells that it moved; fits look less far than this
-constexpr double sure = 3;           ///< standard deviations
+constexpr double around_ball = 1.2;     ///< of its radius: what is not the object
+constexpr double within_ball = 1.4;     ///< its outline is what tells that it moved; fits look less far than this
+constexpr double sure_of_movement = 3;  ///< standard deviations
 
 cv::Mat1b disc(cv::Size size, const Ball& ball, double share) {
     cv::Mat1b mask(size, uchar{0});
@@ -19,7 +19,7 @@ cv::Mat1b disc(cv::Size size, const Ball& ball, double share) {
 }
 
 bool moved_alike(const Shift& a, const Shift& b) {
-    return cv::norm(a.px - b.px) < most_movement_px + sure * std::hypot(a.sigma_px, b.sigma_px);
+    return cv::norm(a.px - b.px) < most_movement_px + sure_of_movement * std::hypot(a.sigma_px, b.sigma_px);
 }
 
 }  // namespace
@@ -29,7 +29,7 @@ std::string Movement::words() const {
     return fmt::format("{} moved by {:.2f} px (noise {:.2f})", who, object.length(), object.sigma_px);
 }
 
-bool Movement::moved(double limit_px) const { return object.length() > limit_px + sure * object.sigma_px; }
+bool Movement::moved(double limit_px) const { return object.length() > limit_px + sure_of_movement * object.sigma_px; }
 
 std::optional<Movement> measure_movement(const cv::Mat1f& before, const cv::Mat1f& after, const cv::Mat1b& usable,
                                          const std::vector<Ball>& balls) {
