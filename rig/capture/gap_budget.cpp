@@ -5,6 +5,7 @@
 #include <algorithm>
 
 namespace darkbox {
+
 std::string GapBudget::words() const {
     return fmt::format(
         "of {:.2f} ms between frames exposure and read-out take {:.2f}, the lamps' settling {:.2f}, a "

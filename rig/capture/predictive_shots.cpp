@@ -17,11 +17,17 @@ constexpr std::size_t longest_block = 64;
 constexpr std::size_t shortest_block = 4;
 /// Before a switch this much time is left alone: fetching a frame could take longer.
 constexpr Nanoseconds longest_guard = std::chrono::milliseconds(3);
-/// What a call to the lamps is expected to take at most; one that takes longer costs a frame.
+/// Beyond its queue, so many may be late before the camera is said to hang.
 constexpr std::uint64_t spare_frames = 16;
+/// What a call to the lamps is expected to take at most; one that takes longer costs a frame.
 constexpr Nanoseconds switching_time = std::chrono::microseconds(50);
 /// Switches in mid-exposure that are tried for one witness.
 constexpr int most_probes = 3;
+/// How long a lamp burns on the way, in frame periods: for its own frame, and for each witness that is tried again.
+constexpr int shot_periods = 3;
+constexpr int retry_periods = 2;
+/// A call to the lamps that takes longer leaves open when they were switched, in tolerances.
+constexpr double longest_call = 4;
 
 }  // namespace
 
@@ -49,7 +55,7 @@ Unproven PredictiveShots::take(std::span<const Shot> shots, const ShotSink& prov
     if (!budget().fits()) return give_up("the gap between exposures is too short: " + budget().words());
     if (!probe_share())
         return give_up("the exposure is too short beside the lamps' settling and the jitter: " + budget().words());
-    if (!lamps_bear_it()) return give_up("a lamp's max_on_s is shorter than three frames");
+    if (!lamps_bear(shot_periods)) return give_up("a lamp's max_on_s is shorter than three frames");
     try {
         run();
     } catch (const DeviceError& error) {
@@ -64,9 +70,9 @@ Unproven PredictiveShots::take(std::span<const Shot> shots, const ShotSink& prov
     return unproven_;
 }
 
-bool PredictiveShots::lamps_bear_it() const {
+bool PredictiveShots::lamps_bear(int periods) const {
     return std::all_of(shots_.begin(), shots_.end(), [&](const Shot& shot) {
-        return 3 * source_.rhythm().period() <= to_nanoseconds(rig_.lamps.at(shot.lamp->value).max_on);
+        return periods * source_.rhythm().period() <= to_nanoseconds(rig_.lamps.at(shot.lamp->value).max_on);
     });
 }
 
@@ -115,16 +121,17 @@ TimePoint PredictiveShots::gap_after(std::uint64_t sequence) const {
     return before.end + std::max(Nanoseconds(0), after.begin - before.end - budget().settle - switching_time) / 2;
 }
 
-void PredictiveShots::light(std::size_t shot, TimePoint moment) {
+Interval PredictiveShots::light(std::size_t shot, TimePoint moment) {
     pump_until(moment);
     const ExposureClock& rhythm = source_.rhythm();
     if (!pending_.empty()) pending_.back().off = clock_.now();
-    lamps_.light(*shots_[shot].lamp);
+    const Interval call = lamps_.light(*shots_[shot].lamp);
     Pending pending;
     pending.on = clock_.now();
     pending.first = rhythm.first_from(lamps_.timeline().steady_from() + rhythm.margin());
     last_frame_ = pending.first + (check_.knows_noise() || shot > 0 ? 0 : 1);
     pending_.push_back(std::move(pending));
+    return call;
 }
 
 WitnessTolerance PredictiveShots::tolerance() const {
@@ -142,34 +149,43 @@ std::optional<double> PredictiveShots::probe_share() const {
     return (1 + telling * (most.late - most.early)) / 2;
 }
 
-/// Switches in the middle of an exposure. A switch that comes so late that its frame could not tell anything is taken
-/// back and tried again: a block of frames hangs on it.
+/// Switches in the middle of an exposure. A switch that comes so late, or takes so long, that its frame could not tell
+/// anything is taken back and tried again where the lamps bear it: a block of frames hangs on it.
 void PredictiveShots::probe(std::optional<std::size_t> before, std::optional<std::size_t> after) {
     const ExposureClock& rhythm = source_.rhythm();
     Witness& witness = witnesses_.emplace_back();
     witness.before = before;
     witness.after = after;
     const std::uint64_t first = before ? last_frame_ + 1 : 0;
+    const int attempts = lamps_bear(shot_periods + (most_probes - 1) * retry_periods) ? most_probes : 1;
     for (int attempt = 1;; ++attempt) {
         const TimePoint from =
             std::max(clock_.now() + longest_guard, lamps_.timeline().steady_from() + rhythm.margin());
         witness.sequence = std::max(rhythm.first_from(from), first);
-        switch_within(witness.sequence, after);
-        if (attempt == most_probes ||
-            can_tell(expected_in(witness), source_.info().height, after.has_value(), tolerance()))
-            return;
+        if (switch_within(witness) || attempt == attempts) return;
         take_back(before, after);
+        witness.frame.reset();
     }
 }
 
-void PredictiveShots::switch_within(std::uint64_t sequence, std::optional<std::size_t> after) {
-    const TimePoint moment = source_.rhythm().predicted(sequence).begin +
-                             to_nanoseconds(*source_.info().readout / 2 +
-                                            (1 - probe_share().value_or(0.5)) * source_.info().controls.exposure);
-    if (after) return light(*after, moment);
-    pump_until(moment);
-    pending_.back().off = clock_.now();
-    lamps_.dark();
+/// Whether it went as planned, or well enough for the witness to be heard.
+bool PredictiveShots::switch_within(const Witness& witness) {
+    const Seconds exposure = source_.info().controls.exposure;
+    const TimePoint moment = source_.rhythm().predicted(witness.sequence).begin +
+                             to_nanoseconds(*source_.info().readout / 2 + (1 - probe_share().value_or(0.5)) * exposure);
+    Interval call;
+    if (witness.after) {
+        call = light(*witness.after, moment);
+    } else {
+        pump_until(moment);
+        pending_.back().off = clock_.now();
+        call = lamps_.dark();
+    }
+    const WitnessTolerance most = tolerance();
+    const Nanoseconds bound = to_nanoseconds(most.early * exposure);
+    if (to_seconds(call.end - call.begin) > longest_call * to_seconds(bound)) return false;
+    return call.end <= moment + bound ||
+           can_tell(expected_in(witness), source_.info().height, witness.after.has_value(), most);
 }
 
 void PredictiveShots::take_back(std::optional<std::size_t> before, std::optional<std::size_t> after) {

@@ -51,9 +51,9 @@ private:
 
     GapBudget budget() const;
     void run();
-    void light(std::size_t shot, TimePoint moment);
+    Interval light(std::size_t shot, TimePoint moment);
     void probe(std::optional<std::size_t> before, std::optional<std::size_t> after);
-    void switch_within(std::uint64_t sequence, std::optional<std::size_t> after);
+    bool switch_within(const Witness& witness);
     void take_back(std::optional<std::size_t> before, std::optional<std::size_t> after);
     TimePoint gap_after(std::uint64_t sequence) const;
     void pump_until(TimePoint moment);
@@ -73,7 +73,7 @@ private:
     };
     WitnessTolerance tolerance() const;
     std::optional<double> probe_share() const;
-    bool lamps_bear_it() const;
+    bool lamps_bear(int periods) const;
     void expect_frames() const;
     std::string name_of(std::size_t shot) const { return rig_.lamps.at(shots_[shot].lamp->value).name; }
     void leave(std::size_t first, std::size_t last, const std::string& reason);

@@ -14,16 +14,20 @@ std::vector<Nanoseconds> settle_times(const RigDescription& rig) {
 TimedLamps::TimedLamps(LampArray& lamps, Clock& clock, const RigDescription& rig)
     : lamps_(lamps), clock_(clock), dark_on_exit_(lamps), timeline_(settle_times(rig)) {}
 
-void TimedLamps::light(LampId lamp) {
+Interval TimedLamps::light(LampId lamp) {
     const TimePoint begin = clock_.now();
     lamps_.light(lamp, 1.0);
-    timeline_.switched({begin, clock_.now()}, lamp);
+    const Interval call{begin, clock_.now()};
+    timeline_.switched(call, lamp);
+    return call;
 }
 
-void TimedLamps::dark() {
+Interval TimedLamps::dark() {
     const TimePoint begin = clock_.now();
     lamps_.dark();
-    timeline_.switched({begin, clock_.now()}, std::nullopt);
+    const Interval call{begin, clock_.now()};
+    timeline_.switched(call, std::nullopt);
+    return call;
 }
 
 }  // namespace darkbox

@@ -14,8 +14,9 @@ public:
     /// All references must outlive this.
     TimedLamps(LampArray& lamps, Clock& clock, const RigDescription& rig);
 
-    void light(LampId lamp);
-    void dark();
+    /// Return when the call to the lamps was made; the switch happened somewhere inside.
+    Interval light(LampId lamp);
+    Interval dark();
     /// A step that strobed lamps made by themselves.
     void note(const StrobeEvent& event, std::optional<LampId> lamp) { timeline_.switched(event.moment, lamp); }
     LampTimeline& timeline() { return timeline_; }

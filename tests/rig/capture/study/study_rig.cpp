@@ -63,8 +63,12 @@ void StudyLamps::set(std::optional<LampId> lamp, TimePoint when) {
     first_lit_ = std::min(first_lit_, when);
 }
 
+void StudyLamps::stall() {
+    if (std::ranges::find(case_.stalled, switches_++) != case_.stalled.end()) clock_.pass(ns(case_.stall));
+}
+
 void StudyLamps::light(LampId lamp, double) {
-    if (std::ranges::find(case_.stalled, lightings_++) != case_.stalled.end()) clock_.pass(ns(case_.stall));
+    stall();
     if (catch_up) catch_up();
     next_step_ = program_.size();
     clock_.pass(ns(random_.uniform(2e-6, 20e-6)));
@@ -73,6 +77,7 @@ void StudyLamps::light(LampId lamp, double) {
 }
 
 void StudyLamps::dark() {
+    if (lit_) stall();
     if (catch_up) catch_up();
     next_step_ = program_.size();
     clock_.pass(ns(random_.uniform(2e-6, 20e-6)));

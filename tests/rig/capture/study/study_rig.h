@@ -54,7 +54,7 @@ struct StudyCase {
     int lie_frames = 0;      ///< late_buffers: how old
     double settle = 0.0005;  ///< what rig.toml says; the lamps come up and fade within it
     std::size_t lamps = 64;
-    std::vector<int> stalled = {};  ///< calls that light a lamp, counted from 0, before which the host does other work
+    std::vector<int> stalled = {};  ///< switches, counted from 0, in whose calls the host does other work at first
     double stall = 0;               ///< for so long
     std::uint64_t seed = 1;
 };
@@ -102,6 +102,7 @@ private:
         TimePoint until = TimePoint::max();
     };
     void set(std::optional<LampId> lamp, TimePoint when);
+    void stall();
 
     const StudyCase& case_;
     StudyClock& clock_;
@@ -113,7 +114,7 @@ private:
     std::vector<StrobeStep> program_;
     std::size_t next_step_ = 0;
     std::vector<StrobeEvent> events_;
-    int lightings_ = 0;
+    int switches_ = 0;
 };
 
 /// What is true of a delivered frame.
