@@ -7,8 +7,8 @@
 namespace darkbox {
 namespace {
 
-constexpr double max_glint_share = 0.04;
-constexpr double small_glint_px = 12;  ///< a spot of this size is compact in a ball of any size
+constexpr double max_glint_share = 0.04;  ///< of the zone's pixels
+constexpr double small_glint_px = 12;     ///< a spot of this size is compact in a ball of any size
 constexpr double least_contrast = 3;
 constexpr double least_radiance = 0.02;
 constexpr double least_movement = 0.02;  ///< in radii
@@ -21,7 +21,7 @@ struct Glint {
 std::optional<Glint> find_glint(const cv::Mat1f& image, const Circle& circle) {
     const double reach = mirror_zone * circle.radius;
     std::vector<float> values;
-    Glint spot;
+    Glint glint;
     const int top = std::max(0, static_cast<int>(std::ceil(circle.y - reach)));
     const int bottom = std::min(image.rows - 1, static_cast<int>(std::floor(circle.y + reach)));
     for (int y = top; y <= bottom; ++y) {
@@ -30,19 +30,19 @@ std::optional<Glint> find_glint(const cv::Mat1f& image, const Circle& circle) {
         const int right = std::min(image.cols - 1, static_cast<int>(std::floor(circle.x + half)));
         for (int x = left; x <= right; ++x) {
             values.push_back(image(y, x));
-            if (image(y, x) > spot.value) spot = {image(y, x), {x, y}};
+            if (image(y, x) > glint.value) glint = {image(y, x), {x, y}};
         }
     }
     if (values.empty()) return std::nullopt;
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::nth_element(values.begin(), middle, values.end());
     const double background = *middle;
-    if (!(spot.value > least_contrast * background + least_radiance)) return std::nullopt;
-    const double half_height = (spot.value + background) / 2;
+    if (!(glint.value > least_contrast * background + least_radiance)) return std::nullopt;
+    const double half_height = (glint.value + background) / 2;
     const auto area = std::count_if(values.begin(), values.end(), [&](float v) { return v > half_height; });
     const double limit = std::max(small_glint_px, max_glint_share * static_cast<double>(values.size()));
     if (static_cast<double>(area) > limit) return std::nullopt;
-    return spot;
+    return glint;
 }
 
 /// Median over the images, pixel by pixel.

@@ -23,7 +23,11 @@ Referred look_up(const Session& session, const SessionReference& old) {
     const fs::path plain = session.folder().has_filename() ? session.folder() : session.folder().parent_path();
     const fs::path there = fs::absolute(plain).parent_path() / old.name;
     if (!is_sealed(there)) return {};
-    return {.found = true, .unchanged = Session::open(there).reference() == old};
+    try {
+        return {.found = true, .unchanged = Session::open(there).reference() == old};
+    } catch (const Error&) {
+        return {.found = true, .unchanged = false};
+    }
 }
 
 /// Says under `key` and in words what `frames` of the session were taken over from, and warns where that is another by
