@@ -7,7 +7,10 @@
 namespace darkbox {
 namespace {
 
-constexpr int most_bands = 48;
+constexpr int usual_bands = 48;
+/// Where a rolling shutter exposes the rows of a band too far apart, there are more bands, until their rows differ by
+/// this part of the tolerance.
+constexpr double alike = 0.5;
 /// A share that noise blurs by more than this part of the tolerance tells nothing.
 constexpr double blur = 0.2;
 /// How far from a band's middle its light may have its centre, as a share of the band.
@@ -126,6 +129,20 @@ WitnessTolerance allowed_in(const BandExpectation& claimed, const WitnessToleran
     return {tolerance.late + claimed.blur, tolerance.early + claimed.blur};
 }
 
+int bands_of(int rows) { return std::min(usual_bands, rows); }
+
+int bands_for(const ExpectedShares& expected, int rows, const WitnessTolerance& tolerance) {
+    const auto blurred = [&](int bands) {
+        for (int band = 0; band < bands; ++band)
+            if (expect(expected, rows * band / bands, rows * (band + 1) / bands, rows).blur > alike * tolerance.early)
+                return true;
+        return false;
+    };
+    int bands = bands_of(rows);
+    while (bands < rows && blurred(bands)) bands = std::min(2 * bands, rows);
+    return bands;
+}
+
 /// A part of an exposure is expected, large and small enough for lies of just over the tolerance to show.
 bool is_telling(const BandExpectation& claimed, bool lit_after, const WitnessTolerance& tolerance) {
     const WitnessTolerance allowed = allowed_in(claimed, tolerance);
@@ -136,7 +153,7 @@ bool is_telling(const BandExpectation& claimed, bool lit_after, const WitnessTol
 }  // namespace
 
 bool can_tell(const ExpectedShares& expected, int rows, bool lit_after, const WitnessTolerance& tolerance) {
-    const int bands = std::min(most_bands, rows);
+    const int bands = bands_for(expected, rows, tolerance);
     for (int band = 0; band < bands; ++band)
         if (is_telling(expect(expected, rows * band / bands, rows * (band + 1) / bands, rows), lit_after, tolerance))
             return true;
@@ -147,7 +164,7 @@ WitnessReport hear_witness(const WitnessPictures& pictures, const NoiseModel& no
                            const ExpectedShares& expected, const WitnessTolerance& tolerance) {
     WitnessReport report;
     const int rows = pictures.dark->rows;
-    const int bands = std::min(most_bands, rows);
+    const int bands = bands_for(expected, rows, tolerance);
     for (int band = 0; band < bands; ++band) {
         const int first = rows * band / bands, last = rows * (band + 1) / bands;
         const Shares seen = shares_of_rows(pictures, noise, full_scale, first, last);
@@ -169,7 +186,7 @@ WitnessReport hear_witness(const WitnessPictures& pictures, const NoiseModel& no
 BandLights compare_bands(const WitnessPictures& pictures, const NoiseModel& noise, double full_scale) {
     BandLights lights;
     const int rows = pictures.dark->rows;
-    const int bands = std::min(most_bands, rows);
+    const int bands = bands_of(rows);
     for (int band = 0; band < bands; ++band) {
         const Shares seen = shares_of_rows(pictures, noise, full_scale, rows * band / bands, rows * (band + 1) / bands);
         if (!seen.solved) continue;
@@ -182,7 +199,7 @@ BandLights compare_bands(const WitnessPictures& pictures, const NoiseModel& nois
 std::vector<BandShare> band_shares(const WitnessPictures& pictures, const NoiseModel& noise, double full_scale) {
     std::vector<BandShare> shares;
     const int rows = pictures.dark->rows;
-    const int bands = std::min(most_bands, rows);
+    const int bands = bands_of(rows);
     for (int band = 0; band < bands; ++band) {
         const int first = rows * band / bands, last = rows * (band + 1) / bands;
         const Shares seen = shares_of_rows(pictures, noise, full_scale, first, last);

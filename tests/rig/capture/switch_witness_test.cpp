@@ -9,7 +9,7 @@
 namespace darkbox {
 namespace {
 
-constexpr int columns = 40, rows = 48;
+constexpr int columns = 40;
 constexpr double witness_full_scale = 4095, witness_black = 64;
 constexpr NoiseModel witness_noise{4.0, 0.05};
 
@@ -18,7 +18,7 @@ class SwitchWitness : public testing::Test {
 protected:
     double light(int lamp, int x, int y) const {
         const double side = lamp == 0 ? x : columns - x;
-        return 300 + 30 * side + 5 * y;
+        return 300 + 30 * side + 240.0 * y / rows;
     }
 
     /// `before` and `after`: shares of the two lamps at a height of 0 to 1.
@@ -54,6 +54,7 @@ protected:
             [&](double height) { return shares(height, readout, 0); }, tolerance);
     }
 
+    int rows = 48;
     std::mt19937 random{3};
 };
 
@@ -74,6 +75,19 @@ TEST_F(SwitchWitness, ContradictsStampsThatAreOffEitherWay) {
                 EXPECT_NEAR(report.latest, std::max(0.0, lie), 0.03);
                 EXPECT_NEAR(report.earliest, std::max(0.0, -lie), 0.03);
             }
+        }
+    }
+}
+
+/// Short exposures of a camera that reads out slowly: a row sees much more of the switch than the next band's.
+TEST_F(SwitchWitness, TellsWhenTheReadOutIsManyExposuresLong) {
+    rows = 720;
+    for (const double readout : {3.0, 6.0, 12.0}) {
+        const WitnessReport honest = hear(readout, 0);
+        EXPECT_TRUE(honest.informative && honest.agrees) << readout << ": " << honest.latest << " " << honest.earliest;
+        for (const double lie : {0.12, 0.5, 1.5, -0.12, -0.5}) {
+            const WitnessReport report = hear(readout, lie);
+            EXPECT_TRUE(report.informative && !report.agrees) << readout << " " << lie;
         }
     }
 }
