@@ -182,8 +182,8 @@ bool PredictiveShots::switch_within(const Witness& witness) {
         call = lamps_.dark();
     }
     const WitnessTolerance most = tolerance();
-    const Nanoseconds bound = to_nanoseconds(most.early * exposure);
-    if (to_seconds(call.end - call.begin) > longest_call * to_seconds(bound)) return false;
+    const Seconds bound = most.early * exposure;
+    if (call.end - call.begin > longest_call * bound) return false;
     return call.end <= moment + bound ||
            can_tell(expected_in(witness), source_.info().height, witness.after.has_value(), most);
 }
@@ -366,9 +366,8 @@ std::string PredictiveShots::heard(const Witness& witness) const {
     const auto report = check_.hear(before, *witness.frame, after, expected_in(witness), tolerance());
     if (!report || !report->informative) return who + " shows too little of both lights to tell when it was exposed";
     if (report->agrees) return "";
-    return fmt::format(
-        "{} was exposed {:.2f} ms from where its timestamp says", who,
-        to_milliseconds(to_nanoseconds(source_.info().controls.exposure)) * std::max(report->latest, report->earliest));
+    return fmt::format("{} was exposed {:.2f} ms from where its timestamp says", who,
+                       1000.0 * source_.info().controls.exposure.count() * std::max(report->latest, report->earliest));
 }
 
 }  // namespace darkbox

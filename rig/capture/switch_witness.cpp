@@ -92,10 +92,18 @@ private:
     Eigen::Vector2d right_ = Eigen::Vector2d::Zero();
 };
 
-Shares shares_of_rows(const WitnessPictures& p, const NoiseModel& noise, double full_scale, int first, int last) {
+struct Band {
+    int first = 0;
+    int last = 0;  ///< row after it
+    double middle() const { return (first + last - 1) / 2.0; }
+};
+Band band_of(int rows, int band, int bands) { return {rows * band / bands, rows * (band + 1) / bands}; }
+
+Shares shares_of_rows(const WitnessPictures& p, const NoiseModel& noise, double full_scale, const Band& band) {
     BandFit fit(noise);
     const auto columns = static_cast<std::size_t>(p.dark->columns);
-    for (std::size_t i = static_cast<std::size_t>(first) * columns; i < static_cast<std::size_t>(last) * columns; ++i) {
+    const auto last = static_cast<std::size_t>(band.last) * columns;
+    for (std::size_t i = static_cast<std::size_t>(band.first) * columns; i < last; ++i) {
         const auto light = [&](const Picture* picture) {
             return picture ? static_cast<double>(picture->samples[i]) - p.dark->samples[i] : 0.0;
         };
@@ -115,9 +123,9 @@ struct BandExpectation {
     double blur = 0.0;
 };
 
-BandExpectation expect(const ExpectedShares& expected, int first, int last, int rows) {
+BandExpectation expect(const ExpectedShares& expected, const Band& band, int rows) {
     const auto at = [&](double row) { return expected(rows > 1 ? row / (rows - 1) : 0.0); };
-    const LightShares top = at(first), middle = at((first + last - 1) / 2.0), bottom = at(last - 1);
+    const LightShares top = at(band.first), middle = at(band.middle()), bottom = at(band.last - 1);
     const auto blur_of = [](double a, double b, double c) {
         return uneven_rows * std::abs(c - a) + std::abs((a + c) / 2 - b);
     };
@@ -134,8 +142,7 @@ int bands_of(int rows) { return std::min(usual_bands, rows); }
 int bands_for(const ExpectedShares& expected, int rows, const WitnessTolerance& tolerance) {
     const auto blurred = [&](int bands) {
         for (int band = 0; band < bands; ++band)
-            if (expect(expected, rows * band / bands, rows * (band + 1) / bands, rows).blur > alike * tolerance.early)
-                return true;
+            if (expect(expected, band_of(rows, band, bands), rows).blur > alike * tolerance.early) return true;
         return false;
     };
     int bands = bands_of(rows);
@@ -155,8 +162,7 @@ bool is_telling(const BandExpectation& claimed, bool lit_after, const WitnessTol
 bool can_tell(const ExpectedShares& expected, int rows, bool lit_after, const WitnessTolerance& tolerance) {
     const int bands = bands_for(expected, rows, tolerance);
     for (int band = 0; band < bands; ++band)
-        if (is_telling(expect(expected, rows * band / bands, rows * (band + 1) / bands, rows), lit_after, tolerance))
-            return true;
+        if (is_telling(expect(expected, band_of(rows, band, bands), rows), lit_after, tolerance)) return true;
     return false;
 }
 
@@ -166,11 +172,11 @@ WitnessReport hear_witness(const WitnessPictures& pictures, const NoiseModel& no
     const int rows = pictures.dark->rows;
     const int bands = bands_for(expected, rows, tolerance);
     for (int band = 0; band < bands; ++band) {
-        const int first = rows * band / bands, last = rows * (band + 1) / bands;
-        const Shares seen = shares_of_rows(pictures, noise, full_scale, first, last);
+        const Band place = band_of(rows, band, bands);
+        const Shares seen = shares_of_rows(pictures, noise, full_scale, place);
         const double most_sigma = blur * std::min(tolerance.late, tolerance.early);
         if (!seen.solved || std::max(seen.before_sigma, seen.after_sigma) > most_sigma) continue;
-        const BandExpectation claimed = expect(expected, first, last, rows);
+        const BandExpectation claimed = expect(expected, place, rows);
         const WitnessTolerance allowed = allowed_in(claimed, tolerance);
         for (const double late : {pictures.before ? seen.before - claimed.shares.before : 0.0,
                                   pictures.after ? claimed.shares.after - seen.after : 0.0}) {
@@ -188,7 +194,7 @@ BandLights compare_bands(const WitnessPictures& pictures, const NoiseModel& nois
     const int rows = pictures.dark->rows;
     const int bands = bands_of(rows);
     for (int band = 0; band < bands; ++band) {
-        const Shares seen = shares_of_rows(pictures, noise, full_scale, rows * band / bands, rows * (band + 1) / bands);
+        const Shares seen = shares_of_rows(pictures, noise, full_scale, band_of(rows, band, bands));
         if (!seen.solved) continue;
         lights.most_before = std::max(lights.most_before, seen.before - clear * seen.before_sigma);
         lights.most_missing = std::max(lights.most_missing, std::abs(1 - seen.after) - clear * seen.after_sigma);
@@ -201,9 +207,9 @@ std::vector<BandShare> band_shares(const WitnessPictures& pictures, const NoiseM
     const int rows = pictures.dark->rows;
     const int bands = bands_of(rows);
     for (int band = 0; band < bands; ++band) {
-        const int first = rows * band / bands, last = rows * (band + 1) / bands;
-        const Shares seen = shares_of_rows(pictures, noise, full_scale, first, last);
-        const double height = rows > 1 ? (first + last - 1) / 2.0 / (rows - 1) : 0.0;
+        const Band place = band_of(rows, band, bands);
+        const Shares seen = shares_of_rows(pictures, noise, full_scale, place);
+        const double height = rows > 1 ? place.middle() / (rows - 1) : 0.0;
         if (seen.solved) shares.push_back({height, seen.after, seen.after_sigma});
     }
     return shares;

@@ -25,7 +25,7 @@ Referred look_up(const Session& session, const SessionReference& old) {
     if (!is_sealed(there)) return {};
     try {
         return {.found = true, .unchanged = Session::open(there).reference() == old};
-    } catch (const Error&) {
+    } catch (const Error&) {  // damaged: not as it was, and no fault of the session that refers to it
         return {.found = true, .unchanged = false};
     }
 }

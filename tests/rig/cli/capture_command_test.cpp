@@ -106,6 +106,11 @@ TEST_F(CaptureCommand, TakesTheFlatFramesOfACardAlong) {
                           "8 of a card taken over from card, which is beside it as it was"));
     EXPECT_THAT(capture({"--rig", rig_, "--plan", "flat", "--flats-from", card}).err, HasSubstr("at once"));
     EXPECT_THAT(darkbox_program({"process", card}).err, HasSubstr("--flats-from"));
+    fs::remove(card / "data/session.json");
+    std::ofstream(card / "data/session.json") << "{";
+    const auto beside_damage = darkbox_program({"verify", vase_});
+    EXPECT_EQ(beside_damage.status, 0) << beside_damage.err;
+    EXPECT_THAT(beside_damage.err, HasSubstr("card is not the session that"));
 }
 
 TEST_F(CaptureCommand, FailsByNameOnADiskThatDoesAndGoesOn) {
